@@ -1,0 +1,69 @@
+// Random numbers keyed by (seed, pass, pixel or light path, dimension): padded (0,2)-sequences, Owen-scrambled and
+// shuffled [Burley 2020, "Practical hash-based Owen scrambling"], made in batches of eight dimension pairs.
+#pragma once
+#include "core/vec.h"
+
+namespace gi {
+
+inline uint32_t hash32(uint32_t x) {  // [Wellons 2018, "lowbias32"]
+  x ^= x >> 16, x *= 0x7feb352du, x ^= x >> 15, x *= 0x846ca68bu;
+  return x ^ (x >> 16);
+}
+inline uint32_t hash_combine(uint32_t a, uint32_t b) { return hash32(a ^ (hash32(b) + 0x9e3779b9u + (a << 6) + (a >> 2))); }
+inline uint32_t reverse_bits(uint32_t x) {
+  x = __builtin_bswap32(x);
+  x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
+  x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
+  return ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
+}
+inline float to_unit_float(uint32_t x) { return float(x >> 8) * 0x1p-24f; }  // in [0, 1)
+
+class Sampler {
+ public:
+  // `stream` is the pixel or light path, `index` the pass: one stream over all passes is one stratified sequence.
+  Sampler(uint32_t seed, uint32_t stream, uint32_t index) : index_(reverse_bits(index)), key_(hash_combine(seed, stream)) {}
+
+  Vec2 next_2d() {
+    if ((dimension_ & 7u) == 0) fill();
+    const uint32_t k = dimension_++ & 7u;
+    return {x_[k], y_[k]};
+  }
+  float next_1d() { return next_2d().x; }
+  // An independent sequence for a sub-estimate (a splitting branch, a light path of the same index).
+  Sampler fork(uint32_t salt) const { return Sampler(index_, hash_combine(key_, salt), 0); }
+  // Moves on to dimension pair `d`: the next bounce starts at the same dimension however many numbers this one used.
+  void jump_to(uint32_t d) {
+    dimension_ = d;
+    if (d & 7u) dimension_ = d & ~7u, fill(), dimension_ = d;
+  }
+
+ private:
+  struct Reversed {};
+  Sampler(uint32_t reversed_index, uint32_t key, int) : index_(reversed_index), key_(key) {}
+
+  // Laine–Karras permutation in the reversed-bit domain, constants by Vegdahl (2022).
+  static uint32_t permute(uint32_t x, uint32_t seed) {
+    x ^= x * 0x3d20adeau, x += seed, x *= (seed >> 16) | 1u, x ^= x * 0x05526c56u;
+    return x ^ (x * 0x53a22864u);
+  }
+  // Second Sobol dimension (Pascal matrix modulo 2) of a bit-reversed index.
+  static uint32_t sobol_1(uint32_t v) {
+    v ^= v << 16, v ^= (v << 8) & 0xff00ff00u, v ^= (v << 4) & 0xf0f0f0f0u, v ^= (v << 2) & 0xccccccccu;
+    return v ^ ((v << 1) & 0xaaaaaaaau);
+  }
+  void fill() {
+    for (uint32_t k = 0; k < 8; ++k) {
+      const uint32_t h = hash32(key_ ^ ((dimension_ + k) * 0x9e3779b9u));
+      uint32_t hx = h * 0x85ebca6bu + 0x3c6ef372u, hy = h * 0xc2b2ae35u + 0x1b873593u;
+      hx ^= hx >> 15, hy ^= hy >> 15;
+      const uint32_t shuffled = permute(index_, h);
+      x_[k] = to_unit_float(reverse_bits(permute(reverse_bits(shuffled), hx)));
+      y_[k] = to_unit_float(reverse_bits(permute(reverse_bits(sobol_1(shuffled)), hy)));
+    }
+  }
+
+  uint32_t index_, key_, dimension_ = 0;
+  float x_[8], y_[8];
+};
+
+}  // namespace gi
