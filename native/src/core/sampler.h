@@ -30,7 +30,11 @@ class Sampler {
   }
   float next_1d() { return next_2d().x; }
   // An independent sequence for a sub-estimate (a splitting branch, a light path of the same index).
-  Sampler fork(uint32_t salt) const { return Sampler(index_, hash_combine(key_, salt), 0); }
+  Sampler fork(uint32_t salt) const {
+    Sampler s = *this;
+    s.key_ = hash_combine(key_, salt), s.dimension_ = 0;
+    return s;
+  }
   // Moves on to dimension pair `d`: the next bounce starts at the same dimension however many numbers this one used.
   void jump_to(uint32_t d) {
     dimension_ = d;
@@ -38,9 +42,6 @@ class Sampler {
   }
 
  private:
-  struct Reversed {};
-  Sampler(uint32_t reversed_index, uint32_t key, int) : index_(reversed_index), key_(key) {}
-
   // Laine–Karras permutation in the reversed-bit domain, constants by Vegdahl (2022).
   static uint32_t permute(uint32_t x, uint32_t seed) {
     x ^= x * 0x3d20adeau, x += seed, x *= (seed >> 16) | 1u, x ^= x * 0x05526c56u;

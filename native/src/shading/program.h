@@ -1,0 +1,105 @@
+// A node tree as a register program: a flat list of instructions over float registers whose first ones are constants.
+// Python compiles node trees to programs (gi_engine/nodes); ops live by family in ops_*.cpp.
+//
+// Instruction: [op, outputs…, inputs…, immediates…]; outputs and inputs are register numbers; a value of width 3
+// ('v': vector, normal, RGB) takes three registers in a row. Jumps go forwards only, so programs always end.
+#pragma once
+#include <cstring>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/vec.h"
+#include "shading/bsdf.h"
+#include "shading/shading_point.h"
+
+namespace gi {
+
+struct ShaderResources;  // images and attribute tables that ops may read: see shading/resources.h
+
+// What one run of a program works on.
+struct ShadeState {
+  ShadingPoint& point;               // ops may shift it (bump)
+  const ShaderResources& resources;
+  const float* tables;               // the program's lookup tables (ramps, curves)
+  Bsdf* bsdf;                        // where closures go; null when only values are wanted
+};
+
+// Access to one instruction's operands, in the order of its signature: outputs, inputs, immediates.
+struct Operands {
+  const int32_t* slots;
+  float* registers;
+  float f(int i) const { return registers[slots[i]]; }
+  Vec3 v(int i) const {
+    const float* p = registers + slots[i];
+    return {p[0], p[1], p[2]};
+  }
+  Rgb c(int i) const { return Rgb(v(i)); }
+  int imm(int i) const { return slots[i]; }
+  void set(int i, float x) const { registers[slots[i]] = x; }
+  void set(int i, Vec3 x) const {
+    float* p = registers + slots[i];
+    p[0] = x.x, p[1] = x.y, p[2] = x.z;
+  }
+  void set(int i, Rgb x) const { set(i, Vec3{x.r, x.g, x.b}); }
+};
+
+using OpFunction = void (*)(const Operands&, ShadeState&);
+
+enum class OpKind : uint8_t {
+  kPure,     // depends on its inputs alone: folded where they are constant
+  kContext,  // reads the shading point, images or tables
+  kClosure,  // adds a lobe, emission or transparency: kept by what it adds
+  kControl,  // jump_if_zero, bump shifts: never folded or dropped on their own
+};
+// What a closure op adds, for the programs specialised to one question.
+enum ClosureEffect : uint8_t { kAddsLobe = 1, kAddsEmission = 2, kAddsTransparency = 4 };
+
+struct Op {
+  const char* name;
+  const char* outputs;  // 'f' or 'v' each
+  const char* inputs;
+  int immediates;
+  OpKind kind;
+  OpFunction run;       // null for jump_if_zero, which the interpreter itself runs
+  uint8_t effects = 0;
+  int width() const { return 1 + int(std::strlen(outputs)) + int(std::strlen(inputs)) + immediates; }
+};
+
+// Every op; the index is the op code. Op 0 is jump_if_zero(condition; target).
+std::span<const Op> ops();
+
+class Program {
+ public:
+  Program() = default;
+  // Checks every op, register and jump; folds constants. Throws InputError naming `name` (the material).
+  Program(std::string name, std::vector<int32_t> code, std::vector<float> constants, int register_count, std::vector<float> tables);
+
+  void run(ShadingPoint& point, const ShaderResources& resources, Bsdf* bsdf) const;
+  // The part of the program that decides transparency (shadow rays), or emission (light sampling).
+  const Program& transparency_program() const { return *transparency_; }
+  const Program& emission_program() const { return *emission_; }
+
+  const std::string& name() const { return name_; }
+  bool has_transparency() const { return effects_ & kAddsTransparency; }
+  bool has_emission() const { return effects_ & kAddsEmission; }
+  bool empty() const { return code_.empty(); }
+  // True if what it computes does not depend on the point: no context op is left.
+  bool is_constant() const { return constant_; }
+
+ private:
+  void fold_constants();
+  Program reduced_to(uint8_t effects) const;
+
+  std::string name_;
+  std::vector<int32_t> code_;
+  std::vector<float> constants_;
+  int register_count_ = 0;
+  std::vector<float> tables_;
+  uint8_t effects_ = 0;
+  bool constant_ = true;
+  std::shared_ptr<Program> transparency_, emission_;
+};
+
+}  // namespace gi

@@ -1,0 +1,41 @@
+// The point being shaded, as node programs and integrators see it. Filled by Scene::shading_point.
+#pragma once
+#include "core/vec.h"
+
+namespace gi {
+
+// The kind of ray that reached the point, as Blender's Light Path node asks. Bits add up.
+enum RayKind : uint32_t {
+  kRayCamera = 1,
+  kRayShadow = 2,
+  kRayDiffuse = 4,
+  kRayGlossy = 8,
+  kRayTransmission = 16,
+  kRaySingular = 32,
+  kRayReflection = 64,
+  kRayVolume = 128,
+};
+
+struct PathState {  // of the ray that arrived
+  uint32_t kind = kRayCamera;
+  int depth = 0, diffuse_depth = 0, glossy_depth = 0, transmission_depth = 0, transparent_depth = 0, portal_depth = 0;
+  float ray_length = 0;
+};
+
+inline constexpr uint32_t kNoId = 0xffffffffu;
+
+struct ShadingPoint {
+  Vec3 position;       // world, metres
+  Vec3 wo;             // unit, towards where the ray came from
+  Vec3 ng, ns;         // geometric and interpolated normal, unit, both turned towards wo
+  bool backfacing = false;
+  Vec3 object_position;  // in the instance's own space
+  uint32_t instance = kNoId, mesh = kNoId, triangle = kNoId;  // kNoId on the world and on lamps
+  float b1 = 0, b2 = 0;  // barycentrics of the triangle's 2nd and 3rd corner
+  Vec3 dpdx, dpdy;       // footprint of the pixel on the surface, world: what Bump and filtering step by
+  float db1_dx = 0, db2_dx = 0, db1_dy = 0, db2_dy = 0;  // the same in barycentrics
+  PathState path;
+  const float* instance_info = nullptr;  // see scene/scene.h InstanceInfo
+};
+
+}  // namespace gi
