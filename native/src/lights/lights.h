@@ -1,0 +1,69 @@
+// All light sources of a scene as one: choosing one for a point, and the densities that MIS needs when a ray finds one
+// by itself. One header per kind of source beside this; the light tree picks among them.
+#pragma once
+#include <memory>
+#include <optional>
+
+#include "scene/scene.h"
+
+namespace gi {
+
+// Where light is wanted.
+struct LightQuery {
+  Vec3 position;
+  Vec3 normal;                // shading normal; zero where there is none (volumes)
+  bool transmission = false;  // the surface also scatters from below
+  PathState path;
+};
+
+struct LightSample {
+  Vec3 wi;                // unit, towards the light
+  float distance = kInf;  // to the sampled point; infinite for sun and world
+  Rgb radiance;           // L along -wi, shadowing left out; for delta lights irradiance-like, so that f cos · radiance / pdf estimates
+  float pdf_dir = 0;      // per steradian, choice of light included; for delta lights the probability of the choice
+  bool is_delta = false;
+  uint32_t light = 0;  // index, below LightSet::count
+  bool cast_shadow = true;
+  bool use_mis = true;  // false: rays never find it by themselves, its weight is 1
+  float diffuse_scale = 1, glossy_scale = 1, transmission_scale = 1;  // Blender's per-lamp factors and visibility
+};
+
+struct LightEval {
+  Rgb radiance;
+  float pdf_dir = 0;  // of LightSet::sample choosing this direction on this light; 0 if it never does
+};
+
+struct LampHit {
+  float t = kInf;
+  uint32_t lamp = 0;
+};
+
+class LightSet {
+ public:
+  explicit LightSet(const Scene& scene);
+  ~LightSet();
+
+  // Picks a light by its estimated contribution and a direction towards it.
+  std::optional<LightSample> sample(const LightQuery& query, float u_choice, Vec2 u) const;
+  // One given light; pdf_dir then leaves out the choice. u = (½, ½) is its centre (hard shadows).
+  std::optional<LightSample> sample_light(uint32_t light, const LightQuery& query, Vec2 u) const;
+  uint32_t count() const;  // lamps, emissive triangles, the world
+  bool empty() const { return count() == 0; }
+
+  // Lamps are transparent: the nearest lamp with a shape that a ray of `visibility` meets in (t_min, t_max).
+  std::optional<LampHit> intersect_lamp(const Ray& ray, uint32_t visibility) const;
+  LightEval eval_lamp(const LightQuery& from, const Ray& ray, const LampHit& hit) const;
+  // Suns of a visible size, seen along a ray that leaves the scene: one call per sun.
+  uint32_t sun_count() const;
+  LightEval eval_sun(uint32_t sun, const LightQuery& from, Vec3 direction, uint32_t visibility) const;
+  // Density with which `sample` picks the point that a ray of length `t` hit on an emissive triangle.
+  float pdf_triangle(const LightQuery& from, const ShadingPoint& point, float t) const;
+  // Density with which `sample` picks `direction` on the world.
+  float pdf_world(const LightQuery& from, Vec3 direction) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace gi

@@ -1,0 +1,49 @@
+// Ray tracing against triangles: the only place that knows Embree.
+#pragma once
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/vec.h"
+
+namespace gi {
+
+struct Hit {
+  float t = kInf;
+  uint32_t instance = 0xffffffffu, triangle = 0xffffffffu;
+  float b1 = 0, b2 = 0;
+};
+
+// A mesh as Embree sees it: buffers are shared and must outlive the Accel; `positions` readable 4 bytes past its end.
+struct AccelMesh {
+  const float* positions = nullptr;
+  size_t vertex_count = 0;
+  const uint32_t* indices = nullptr;
+  size_t triangle_count = 0;
+};
+
+struct AccelInstance {
+  uint32_t mesh = 0;
+  const Affine* matrix = nullptr;  // null: the mesh is in world space and goes into the top level itself
+  uint32_t mask = 0xffffffffu;     // a ray sees the instance if (mask & ray mask) != 0
+};
+
+class Accel {
+ public:
+  virtual ~Accel() = default;
+  virtual std::optional<Hit> intersect(const Ray& ray, uint32_t mask) const = 0;
+  virtual bool occluded(const Ray& ray, uint32_t mask) const = 0;
+  // Every hit along the ray, nearest first, each once.
+  virtual void all_hits(const Ray& ray, uint32_t mask, std::vector<Hit>& hits) const = 0;
+  virtual size_t memory_bytes() const = 0;
+  virtual std::string description() const = 0;  // file and version of Embree
+};
+
+// Loads Embree from `library`, checks that it is laid out as we think, builds in `threads` threads (0: all cores).
+// Throws DeviceError.
+std::unique_ptr<Accel> build_accel(const std::string& library, std::vector<AccelMesh> meshes, std::vector<AccelInstance> instances,
+                                   int threads);
+
+}  // namespace gi

@@ -1,0 +1,84 @@
+// The scene that integrators trace: geometry, what it is made of and what can be asked at a point.
+// Embree lives behind Accel (accel.h) and shows nowhere else. Light selection is in lights/.
+#pragma once
+#include <memory>
+#include <span>
+
+#include "scene/accel.h"
+#include "scene/scene_data.h"
+#include "shading/program.h"
+#include "shading/resources.h"
+
+namespace gi {
+
+// One placed mesh, ready for shading.
+struct Instance {
+  uint32_t mesh = 0;
+  Affine to_world, to_object;
+  bool mirrored = false;     // negative determinant
+  bool world_space = false;  // the mesh's positions are already in world space
+  const InstanceData* data = nullptr;
+};
+
+class Scene {
+ public:
+  // `embree` is the library to load. Throws InputError or DeviceError.
+  Scene(SceneData data, std::unique_ptr<ShaderResources> resources, const std::string& embree, int threads);
+  ~Scene();
+  Scene(const Scene&) = delete;
+
+  // Nearest hit of a ray of `visibility` (RayKind bits) within [t_min, t_max].
+  std::optional<Hit> intersect(const Ray& ray, uint32_t visibility) const { return accel_->intersect(ray, visibility); }
+  // Fraction of light that passes along a shadow ray: 0 or 1 for opaque scenes, programs decide for transparent surfaces.
+  Rgb transmittance(const Ray& ray, const PathState& path) const;
+
+  // What programs may ask. `ray` is the one that hit; `footprint` is the pixel's radius there, in metres.
+  ShadingPoint shading_point(const Ray& ray, const Hit& hit, const PathState& path, float footprint = 0) const;
+  // The point of triangle `triangle` at barycentrics (b1, b2), seen from direction `wo`: for light sampling and texels.
+  ShadingPoint surface_point(uint32_t instance, uint32_t triangle, float b1, float b2, Vec3 wo, const PathState& path,
+                             float footprint = 0) const;
+  // The world as seen along `direction`.
+  ShadingPoint world_point(Vec3 direction, const PathState& path) const;
+
+  // Runs the material's program: lobes, emission and transparency.
+  void shade(ShadingPoint& point, Bsdf& bsdf) const;
+  Rgb emission(ShadingPoint& point) const;      // of the surface, towards point.wo
+  Rgb transparency(ShadingPoint& point) const;  // of the surface, straight through
+  Rgb world_radiance(Vec3 direction, const PathState& path) const;
+  Rgb run_emission(int program, ShadingPoint& point) const;  // of a lamp's or the world's program
+
+  int material_of(uint32_t instance, uint32_t triangle) const;  // index for material()
+  const MaterialData& material(int i) const { return data_.materials[size_t(i)]; }
+  std::span<const Instance> instances() const { return instances_; }
+  const MeshData& mesh(uint32_t i) const { return data_.meshes[i]; }
+  const SceneData& data() const { return data_; }
+  void triangle_vertices(uint32_t instance, uint32_t triangle, Vec3 out[3]) const;  // world space
+  Bounds bounds() const { return bounds_; }
+  const ShaderResources& resources() const { return *resources_; }
+
+  // The attribute in slot `slot` (SceneData::attribute_names; "" is the active UV map) at the point; falls back on object
+  // and instancer attributes. False if the object has none. Missing components: 0, alpha 1.
+  bool attribute(const ShadingPoint& point, int slot, float out[4]) const;
+  // Directions ∂P/∂u, ∂P/∂v of a UV map over the surface, world space. False if there is none or it is degenerate.
+  bool uv_tangents(const ShadingPoint& point, int slot, Vec3& dp_du, Vec3& dp_dv) const;
+
+  std::string embree_description() const { return accel_->description(); }
+  size_t memory_bytes() const;  // geometry and acceleration structure
+
+ private:
+  void place_meshes();
+  void resolve_attributes();
+  void build_accel(const std::string& embree, int threads);
+  Vec3 vertex(const Instance& instance, uint32_t v) const;
+
+  SceneData data_;
+  std::vector<Instance> instances_;
+  std::vector<std::vector<int32_t>> attribute_index_;  // per mesh and slot: which of its attributes, or -1
+  std::vector<std::vector<uint32_t>> indices_;         // per mesh: Embree's index buffer
+  std::unique_ptr<ShaderResources> resources_;
+  std::unique_ptr<Accel> accel_;
+  Bounds bounds_;
+  bool any_transparent_ = false;
+};
+
+}  // namespace gi

@@ -1,0 +1,114 @@
+// The scene as it arrives from export: the native twin of gi_engine/scene_data.py. Arrays are shared with NumPy.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/vec.h"
+#include "shading/program.h"
+
+namespace gi {
+
+// A view of an array owned elsewhere (by NumPy); `owner` keeps it alive.
+template <class T>
+struct Array {
+  T* data = nullptr;
+  size_t size = 0;
+  std::shared_ptr<void> owner;
+  T& operator[](size_t i) const { return data[i]; }
+  bool empty() const { return size == 0; }
+};
+
+enum class Domain : uint8_t { kPoint, kCorner, kFace };
+
+struct AttributeData {
+  std::string name;
+  Domain domain = Domain::kCorner;
+  int components = 3;
+  Array<const float> data;
+};
+
+struct MeshData {
+  std::string name;
+  Array<float> positions;  // 3 per vertex; taken over: moved to world space where one instance alone uses the mesh
+  Array<const int32_t> corner_vert, tri_corner, tri_face, face_material;
+  Domain normals_domain = Domain::kFace;
+  Array<const float> normals;
+  std::vector<AttributeData> attributes;
+  std::string active_uv;
+  Vec3 texture_location, texture_size{1, 1, 1};
+  size_t triangle_count() const { return tri_corner.size / 3; }
+  size_t vertex_count() const { return positions.size / 3; }
+};
+
+struct InstanceAttribute {
+  std::string name;
+  float value[4];
+};
+
+struct InstanceData {
+  std::string name;
+  uint32_t mesh = 0;
+  Affine matrix;
+  std::vector<int32_t> materials;  // program of each slot
+  uint32_t visibility = 0xffffffffu;
+  float color[4] = {1, 1, 1, 1};
+  int object_index = 0;
+  float random = 0;
+  bool holdout = false;
+  float shadow_terminator_offset = 0;
+  std::vector<InstanceAttribute> attributes;
+};
+
+enum class LampKind : uint8_t { kPoint, kSpot, kArea, kSun };
+
+struct LampData {  // units: gi_engine/scene_data.py Light
+  std::string name;
+  LampKind kind = LampKind::kPoint;
+  Affine matrix;
+  Rgb color;
+  bool normalize = true;
+  float radius = 0;
+  bool soft_falloff = true;
+  float spot_size = 0.7853982f, spot_blend = 0;
+  bool ellipse = false;
+  float size_x = 1, size_y = 1, spread = kPi;
+  float angle = 0;
+  int program = -1;
+  uint32_t visibility = 0xffffffffu;
+  bool cast_shadow = true, use_mis = true;
+  int max_bounces = 1024;
+  float diffuse_factor = 1, glossy_factor = 1, transmission_factor = 1;
+};
+
+struct WorldData {
+  int program = -1;
+  uint32_t visibility = 0xffffffffu;
+  bool sampled = true;     // light sampling of the world
+  int map_resolution = 0;  // of the importance map; 0: automatic
+  int max_bounces = 1024;
+};
+
+enum class EmissionSampling : uint8_t { kNone, kAuto, kFront, kBack, kFrontBack };
+
+struct MaterialData {
+  Program program;
+  int pass_index = 0;
+  EmissionSampling emission_sampling = EmissionSampling::kAuto;
+  bool transparent_shadows = true;
+};
+
+struct SceneData {
+  std::vector<MeshData> meshes;
+  std::vector<InstanceData> instances;
+  std::vector<LampData> lamps;
+  std::vector<MaterialData> materials;  // programs of materials, lamps and the world
+  std::vector<std::string> attribute_names;
+  WorldData world;
+};
+
+// Checks shapes, index ranges and finiteness; mends what it can (NaN vertices, indices out of range: the triangle goes)
+// with a warning that names the object. Throws InputError where nothing sensible is left.
+void validate(SceneData& data, std::vector<std::string>& warnings);
+
+}  // namespace gi
