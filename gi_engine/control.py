@@ -1,0 +1,70 @@
+"""What whoever starts a render from outside Blender's UI wants of it: settings to override, a way to watch, a way to stop.
+
+The command line sets `current`; the engine asks it. No bpy in here. Where nobody set it, rendering is Blender's own affair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from .scene_data import Settings
+
+
+@dataclass
+class Progress:
+    """The state of a running render, as the engine tells it after every poll."""
+
+    stage: str = ""  # what is being done where no pass is running: "Export", "Build BVH", …
+    fraction: float = 0.0  # 0..1 of whichever target (samples, time, noise) comes first
+    passes: int = 0  # passes in the film
+    rays: int = 0  # traced so far
+    seconds: float = 0.0  # of sampling; start-up not counted
+    seconds_left: float | None = None  # None while nobody can say
+    noise: float | None = None  # 95th percentile of the relative standard error, where it is measured
+
+
+@dataclass
+class Control:
+    """One caller's wishes. `overrides` are fields of Settings by name; `parameters` go to the integrator by name."""
+
+    overrides: dict = field(default_factory=dict)
+    parameters: dict = field(default_factory=dict)
+    on_progress: Callable[[Progress], None] | None = None
+    cancelled: bool = False  # set by a signal handler; the engine stops after the poll that sees it and keeps what it has
+    last: Progress = field(default_factory=Progress)
+    warnings: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+
+
+current: Control | None = None
+
+
+def apply(settings: Settings) -> Settings:
+    """The scene's settings with the caller's overrides over them."""
+    if current is None:
+        return settings
+    return replace(settings, **current.overrides, parameters={**settings.parameters, **current.parameters})
+
+
+def report(progress: Progress) -> None:
+    if current is not None:
+        current.last = progress
+        if current.on_progress is not None:
+            current.on_progress(progress)
+
+
+def cancelled() -> bool:
+    return current is not None and current.cancelled
+
+
+def warn(message: str) -> None:
+    """A warning that names the thing; the engine reports it to Blender as well."""
+    if current is not None and message not in current.warnings:
+        current.warnings.append(message)
+
+
+def fail(message: str) -> None:
+    """The message of a render that failed; the engine reports it to Blender as well."""
+    if current is not None:
+        current.errors.append(message)
