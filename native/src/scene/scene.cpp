@@ -1,0 +1,301 @@
+// Scene: placing meshes, interpolating what programs ask for, running them. Ray tracing itself is Accel's.
+#include "scene/scene.h"
+
+#include "core/check.h"
+
+namespace gi {
+namespace {
+
+// Instances whose materials may let shadow rays through answer to this bit instead of kRayShadow, so that one
+// occlusion query settles all that is opaque.
+constexpr uint32_t kTransparentShadowBit = 1u << 16;
+
+}  // namespace
+
+Scene::Scene(SceneData data, std::unique_ptr<ShaderResources> resources, const std::string& embree, int threads)
+    : data_(std::move(data)), resources_(std::move(resources)) {
+  resources_->scene = this;
+  place_meshes();
+  resolve_attributes();
+  build_accel(embree, threads);
+}
+
+Scene::~Scene() = default;
+
+// ---------------------------------------------------------------- building
+
+void Scene::place_meshes() {
+  std::vector<uint32_t> uses(data_.meshes.size(), 0);
+  for (const InstanceData& i : data_.instances) ++uses[i.mesh];
+  for (const InstanceData& i : data_.instances) {
+    Instance placed;
+    placed.mesh = i.mesh;
+    placed.to_world = i.matrix;
+    placed.to_object = i.matrix.inverse();
+    placed.mirrored = i.matrix.determinant() < 0.0f;
+    placed.world_space = uses[i.mesh] == 1;
+    placed.data = &i;
+    MeshData& mesh = data_.meshes[i.mesh];
+    if (placed.world_space && !i.matrix.is_identity()) {
+      // The caller's array stays as it is; the moved one takes its place (and its memory, once the caller lets go).
+      auto moved = std::make_shared<std::vector<float>>(mesh.positions.size + 1);
+      for (size_t v = 0; v < mesh.positions.size; v += 3) {
+        const Vec3 p = i.matrix.point({mesh.positions[v], mesh.positions[v + 1], mesh.positions[v + 2]});
+        (*moved)[v] = p.x, (*moved)[v + 1] = p.y, (*moved)[v + 2] = p.z;
+      }
+      mesh.positions = {moved->data(), mesh.positions.size, moved};
+    }
+    Bounds local;
+    for (size_t v = 0; v < mesh.positions.size; v += 3) {
+      const Vec3 p{mesh.positions[v], mesh.positions[v + 1], mesh.positions[v + 2]};
+      if (is_finite(p)) local.add(p);
+    }
+    for (int corner = 0; corner < 8 && !local.empty(); ++corner) {
+      const Vec3 p{corner & 1 ? local.hi.x : local.lo.x, corner & 2 ? local.hi.y : local.lo.y, corner & 4 ? local.hi.z : local.lo.z};
+      bounds_.add(placed.world_space ? p : placed.to_world.point(p));
+    }
+    instances_.push_back(placed);
+  }
+}
+
+void Scene::resolve_attributes() {
+  attribute_index_.resize(data_.meshes.size());
+  for (size_t m = 0; m < data_.meshes.size(); ++m) {
+    const MeshData& mesh = data_.meshes[m];
+    for (const std::string& slot : data_.attribute_names) {
+      const std::string& name = slot.empty() ? mesh.active_uv : slot;
+      int found = -1;
+      for (size_t a = 0; a < mesh.attributes.size() && !name.empty(); ++a)
+        if (mesh.attributes[a].name == name) found = int(a);
+      attribute_index_[m].push_back(found);
+    }
+  }
+}
+
+void Scene::build_accel(const std::string& embree, int threads) {
+  indices_.resize(data_.meshes.size());
+  std::vector<AccelMesh> meshes;
+  for (size_t m = 0; m < data_.meshes.size(); ++m) {
+    const MeshData& mesh = data_.meshes[m];
+    indices_[m].resize(mesh.tri_corner.size);
+    for (size_t k = 0; k < mesh.tri_corner.size; ++k) indices_[m][k] = uint32_t(mesh.corner_vert[size_t(mesh.tri_corner[k])]);
+    meshes.push_back({mesh.positions.data, mesh.vertex_count(), indices_[m].data(), mesh.triangle_count()});
+  }
+  std::vector<AccelInstance> placed;
+  for (const Instance& i : instances_) {
+    bool transparent = false;
+    for (const int program : i.data->materials) {
+      const MaterialData& material = data_.materials[size_t(program)];
+      transparent |= material.transparent_shadows && material.program.has_transparency();
+    }
+    uint32_t mask = i.data->visibility & 0xffffu;
+    if (transparent && (mask & kRayShadow)) mask = (mask & ~uint32_t(kRayShadow)) | kTransparentShadowBit, any_transparent_ = true;
+    placed.push_back({i.mesh, i.world_space ? nullptr : &i.to_world, mask});
+  }
+  accel_ = gi::build_accel(embree, std::move(meshes), std::move(placed), threads);
+}
+
+size_t Scene::memory_bytes() const {
+  size_t bytes = accel_->memory_bytes() + instances_.size() * (sizeof(Instance) + sizeof(InstanceData));
+  for (const MeshData& m : data_.meshes) {
+    bytes += (m.positions.size + m.corner_vert.size + 2 * m.tri_corner.size + m.tri_face.size + m.face_material.size + m.normals.size) * 4;
+    for (const AttributeData& a : m.attributes) bytes += a.data.size * 4;
+  }
+  return bytes;
+}
+
+// ---------------------------------------------------------------- points
+
+Vec3 Scene::vertex(const Instance& instance, uint32_t v) const {
+  const float* p = data_.meshes[instance.mesh].positions.data + 3 * size_t(v);
+  const Vec3 q{p[0], p[1], p[2]};
+  return instance.world_space ? q : instance.to_world.point(q);
+}
+
+void Scene::triangle_vertices(uint32_t instance, uint32_t triangle, Vec3 out[3]) const {
+  const Instance& placed = instances_[instance];
+  const uint32_t* v = indices_[placed.mesh].data() + 3 * size_t(triangle);
+  for (int k = 0; k < 3; ++k) out[k] = vertex(placed, v[k]);
+}
+
+int Scene::material_of(uint32_t instance, uint32_t triangle) const {
+  const Instance& placed = instances_[instance];
+  const MeshData& mesh = data_.meshes[placed.mesh];
+  const std::vector<int32_t>& slots = placed.data->materials;
+  if (mesh.face_material.empty()) return slots[0];
+  const int slot = mesh.face_material[size_t(mesh.tri_face[triangle])];
+  return slots[size_t(std::clamp(slot, 0, int(slots.size()) - 1))];
+}
+
+ShadingPoint Scene::surface_point(uint32_t instance, uint32_t triangle, float b1, float b2, Vec3 wo, const PathState& path,
+                                  float footprint) const {
+  const Instance& placed = instances_[instance];
+  const MeshData& mesh = data_.meshes[placed.mesh];
+  Vec3 v[3];
+  triangle_vertices(instance, triangle, v);
+  const Vec3 e1 = v[1] - v[0], e2 = v[2] - v[0];
+
+  ShadingPoint p;
+  p.position = v[0] + b1 * e1 + b2 * e2;
+  p.object_position = placed.to_object.point(p.position);
+  p.wo = wo;
+  p.instance = instance, p.mesh = placed.mesh, p.triangle = triangle;
+  p.b1 = b1, p.b2 = b2;
+  p.path = path;
+
+  // Normals turn as the object does, so a mirrored one keeps its outside.
+  const Vec3 n = cross(e1, e2);
+  p.ng = normalize_or(placed.mirrored ? -n : n, wo);
+  p.ns = p.ng;
+  if (mesh.normals_domain != Domain::kFace) {
+    const int32_t* corner = mesh.tri_corner.data + 3 * size_t(triangle);
+    const float w[3] = {1.0f - b1 - b2, b1, b2};
+    Vec3 sum;
+    for (int k = 0; k < 3; ++k) {
+      const int32_t c = mesh.normals_domain == Domain::kPoint ? mesh.corner_vert[size_t(corner[k])] : corner[k];
+      const float* q = mesh.normals.data + 3 * size_t(c);
+      sum += w[k] * Vec3{q[0], q[1], q[2]};
+    }
+    p.ns = normalize_or(placed.to_object.transposed_vector(sum), p.ng);
+  }
+  p.backfacing = dot(p.ng, wo) < 0.0f;
+  if (p.backfacing) p.ng = -p.ng, p.ns = -p.ns;
+
+  if (footprint > 0.0f) {
+    const Frame frame = Frame::from_normal(p.ng);
+    p.dpdx = frame.x * footprint, p.dpdy = frame.y * footprint;
+    // Least squares on the triangle's plane turns the steps into barycentric ones.
+    const float a = dot(e1, e1), b = dot(e1, e2), c = dot(e2, e2), det = a * c - b * b;
+    if (det > 0.0f) {
+      const auto solve = [&](Vec3 d, float& db1, float& db2) {
+        const float x = dot(d, e1), y = dot(d, e2);
+        db1 = (c * x - b * y) / det, db2 = (a * y - b * x) / det;
+      };
+      solve(p.dpdx, p.db1_dx, p.db2_dx);
+      solve(p.dpdy, p.db1_dy, p.db2_dy);
+    }
+  }
+  return p;
+}
+
+ShadingPoint Scene::shading_point(const Ray& ray, const Hit& hit, const PathState& path, float footprint) const {
+  PathState arrived = path;
+  arrived.ray_length = hit.t;
+  return surface_point(hit.instance, hit.triangle, hit.b1, hit.b2, -ray.direction, arrived, footprint);
+}
+
+ShadingPoint Scene::world_point(Vec3 direction, const PathState& path) const {
+  ShadingPoint p;
+  p.position = p.object_position = direction;
+  p.wo = p.ng = p.ns = -direction;
+  p.path = path;
+  return p;
+}
+
+// ---------------------------------------------------------------- shading
+
+void Scene::shade(ShadingPoint& point, Bsdf& bsdf) const {
+  bsdf.clear(point.ng, point.ns);
+  material(material_of(point.instance, point.triangle)).program.run(point, *resources_, &bsdf);
+  bsdf.finish(point.wo);
+}
+
+Rgb Scene::emission(ShadingPoint& point) const {
+  return run_emission(material_of(point.instance, point.triangle), point);
+}
+
+Rgb Scene::run_emission(int program, ShadingPoint& point) const {
+  const Program& p = material(program).program;
+  if (!p.has_emission()) return Rgb();
+  Bsdf bsdf;
+  bsdf.clear(point.ng, point.ns);
+  p.emission_program().run(point, *resources_, &bsdf);
+  return bsdf.emission;
+}
+
+Rgb Scene::transparency(ShadingPoint& point) const {
+  const Program& p = material(material_of(point.instance, point.triangle)).program;
+  if (!p.has_transparency()) return Rgb();
+  Bsdf bsdf;
+  bsdf.clear(point.ng, point.ns);
+  p.transparency_program().run(point, *resources_, &bsdf);
+  return bsdf.transparency;
+}
+
+Rgb Scene::world_radiance(Vec3 direction, const PathState& path) const {
+  if (data_.world.program < 0) return Rgb();
+  ShadingPoint point = world_point(direction, path);
+  return run_emission(data_.world.program, point);
+}
+
+Rgb Scene::transmittance(const Ray& ray, const PathState& path) const {
+  if (accel_->occluded(ray, kRayShadow)) return Rgb();
+  Rgb passed(1.0f);
+  if (!any_transparent_) return passed;
+  static thread_local std::vector<Hit> hits;
+  accel_->all_hits(ray, kTransparentShadowBit, hits);
+  PathState state = path;
+  state.kind = kRayShadow;
+  for (const Hit& hit : hits) {
+    const MaterialData& m = material(material_of(hit.instance, hit.triangle));
+    if (!m.transparent_shadows) return Rgb();
+    ShadingPoint point = shading_point(ray, hit, state);
+    passed *= transparency(point);
+    if (is_black(passed)) return Rgb();
+    ++state.transparent_depth;
+  }
+  return passed;
+}
+
+// ---------------------------------------------------------------- attributes
+
+bool Scene::attribute(const ShadingPoint& point, int slot, float out[4]) const {
+  out[0] = out[1] = out[2] = 0.0f, out[3] = 1.0f;
+  if (point.instance == kNoId || slot < 0) return false;
+  const Instance& placed = instances_[point.instance];
+  const int index = attribute_index_[placed.mesh][size_t(slot)];
+  if (index < 0) {
+    for (const InstanceAttribute& a : placed.data->attributes) {
+      if (a.name != data_.attribute_names[size_t(slot)]) continue;
+      std::copy_n(a.value, 4, out);
+      return true;
+    }
+    return false;
+  }
+  const MeshData& mesh = data_.meshes[placed.mesh];
+  const AttributeData& a = mesh.attributes[size_t(index)];
+  const size_t n = size_t(a.components);
+  if (a.domain == Domain::kFace) {
+    std::copy_n(a.data.data + size_t(mesh.tri_face[point.triangle]) * n, n, out);
+    return true;
+  }
+  const int32_t* corner = mesh.tri_corner.data + 3 * size_t(point.triangle);
+  const float w[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
+  float sum[4] = {0, 0, 0, 0};
+  for (int k = 0; k < 3; ++k) {
+    const size_t at = size_t(a.domain == Domain::kPoint ? mesh.corner_vert[size_t(corner[k])] : corner[k]);
+    for (size_t c = 0; c < n; ++c) sum[c] += w[k] * a.data[at * n + c];
+  }
+  std::copy_n(sum, n, out);
+  return true;
+}
+
+bool Scene::uv_tangents(const ShadingPoint& point, int slot, Vec3& dp_du, Vec3& dp_dv) const {
+  if (point.instance == kNoId) return false;
+  ShadingPoint corner = point;
+  float uv[3][4];
+  for (int k = 0; k < 3; ++k) {
+    corner.b1 = k == 1, corner.b2 = k == 2;
+    if (!attribute(corner, slot, uv[k])) return false;
+  }
+  Vec3 v[3];
+  triangle_vertices(point.instance, point.triangle, v);
+  const float du1 = uv[1][0] - uv[0][0], dv1 = uv[1][1] - uv[0][1], du2 = uv[2][0] - uv[0][0], dv2 = uv[2][1] - uv[0][1];
+  const float det = du1 * dv2 - dv1 * du2;
+  if (det == 0.0f) return false;
+  dp_du = ((v[1] - v[0]) * dv2 - (v[2] - v[0]) * dv1) / det;
+  dp_dv = ((v[2] - v[0]) * du1 - (v[1] - v[0]) * du2) / det;
+  return length_squared(dp_du) > 0.0f && length_squared(dp_dv) > 0.0f;
+}
+
+}  // namespace gi
