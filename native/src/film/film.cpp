@@ -1,0 +1,159 @@
+// Accumulating and reading the film.
+#include "film/film.h"
+
+#include <numeric>
+
+#include "core/check.h"
+
+namespace gi {
+namespace {
+
+constexpr int kTileSize = 16;
+
+enum class Keep { kMean, kFirst };  // averaged over the samples, or of the first sample (indices and depth do not average)
+
+struct PassRule {
+  const char* name;
+  int channels;
+  Keep keep;
+  void (*write)(const PixelSample&, float*);
+};
+
+void write_rgb(Rgb c, float* out) { out[0] = c.r, out[1] = c.g, out[2] = c.b; }
+void write_vec(Vec3 v, float* out) { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
+
+const PassRule kPassRules[] = {
+    {"Combined", 4, Keep::kMean, [](const PixelSample& s, float* o) { write_rgb(s.radiance, o), o[3] = s.alpha; }},
+    {"Depth", 1, Keep::kFirst, [](const PixelSample& s, float* o) { o[0] = s.depth; }},
+    {"Position", 3, Keep::kFirst, [](const PixelSample& s, float* o) { write_vec(s.position, o); }},
+    {"Normal", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_vec(s.normal, o); }},
+    {"UV", 3, Keep::kMean, [](const PixelSample& s, float* o) { o[0] = s.uv.x, o[1] = s.uv.y, o[2] = s.has_uv ? 1.0f : 0.0f; }},
+    {"Denoising Albedo", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_rgb(s.albedo, o); }},
+    {"Denoising Normal", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_vec(s.normal, o); }},
+    {"Object Index", 1, Keep::kFirst, [](const PixelSample& s, float* o) { o[0] = s.object_index; }},
+    {"Material Index", 1, Keep::kFirst, [](const PixelSample& s, float* o) { o[0] = s.material_index; }},
+    {"Emission", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_rgb(s.emission, o); }},
+    {"Environment", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_rgb(s.environment, o); }},
+};
+constexpr const char* kSampleCount = "Debug Sample Count";
+
+const PassRule* find_rule(const std::string& name) {
+  for (const PassRule& rule : kPassRules)
+    if (name == rule.name) return &rule;
+  return nullptr;
+}
+
+}  // namespace
+
+int Film::channels(const std::string& pass) {
+  if (pass == kSampleCount) return 1;
+  const PassRule* rule = find_rule(pass);
+  return rule ? rule->channels : 0;
+}
+
+Film::Film(FilmSpec spec) : spec_(std::move(spec)), filter_(spec_.filter, spec_.filter_width) {
+  require(spec_.width > 0 && spec_.height > 0, "the image must have at least one pixel, not " + std::to_string(spec_.width) + " x " + std::to_string(spec_.height));
+  require(spec_.x0 >= 0 && spec_.y0 >= 0 && spec_.x1 <= spec_.width && spec_.y1 <= spec_.height && spec_.x0 < spec_.x1 && spec_.y0 < spec_.y1,
+          "the render region is empty or lies outside the image");
+  const int w = spec_.region_width(), h = spec_.region_height();
+  // From the top down, as people read pictures.
+  for (int y = h; y > 0; y -= kTileSize)
+    for (int x = 0; x < w; x += kTileSize) tiles_.push_back({x, std::max(0, y - kTileSize), std::min(w, x + kTileSize), y});
+  tile_mutex_ = std::make_unique<std::mutex[]>(tiles_.size());
+  const size_t pixels = size_t(w) * size_t(h);
+  for (const std::string& name : spec_.passes) {
+    if (name == kSampleCount) continue;  // count_ is always there
+    const PassRule* rule = find_rule(name);
+    require(rule, "there is no pass named '" + name + "'");
+    layers_.push_back({name, rule->channels, std::vector<float>(pixels * size_t(rule->channels), 0.0f)});
+  }
+  count_.assign(pixels, 0);
+  luminance_sum_.assign(pixels, 0.0f);
+  luminance_square_sum_.assign(pixels, 0.0f);
+}
+
+void Film::add_tile(int tile, int pass, const std::vector<PixelSample>& samples) {
+  const Tile& t = tiles_[size_t(tile)];
+  const std::lock_guard lock(tile_mutex_[size_t(tile)]);
+  size_t k = 0;
+  for (int y = t.y0; y < t.y1; ++y)
+    for (int x = t.x0; x < t.x1; ++x) add_sample(size_t(y) * size_t(spec_.region_width()) + size_t(x), pass == 0, samples[k++]);
+}
+
+void Film::add_sample(size_t pixel, bool first, PixelSample s) {
+  if (!is_finite(s.radiance) || !std::isfinite(s.alpha)) {
+    // The sample still counts for the other passes' sake; its light is left out and the number of such samples reported.
+    s.radiance = Rgb(), s.alpha = std::isfinite(s.alpha) ? s.alpha : 1.0f;
+    const std::lock_guard lock(stats_mutex_);
+    ++bad_samples_;
+  }
+  s.radiance *= spec_.exposure, s.emission *= spec_.exposure, s.environment *= spec_.exposure;
+  ++count_[pixel];
+  const float y = luminance(s.radiance);
+  luminance_sum_[pixel] += y;
+  luminance_square_sum_[pixel] += y * y;
+  for (Layer& layer : layers_) {
+    const PassRule& rule = *find_rule(layer.name);
+    float value[4];
+    rule.write(s, value);
+    float* sum = layer.sum.data() + pixel * size_t(layer.channels);
+    if (rule.keep == Keep::kFirst) {
+      if (first) std::copy_n(value, layer.channels, sum);
+      continue;
+    }
+    for (int c = 0; c < layer.channels; ++c)
+      if (std::isfinite(value[c])) sum[c] += value[c];
+  }
+}
+
+void Film::read(const std::string& pass, float* out) const {
+  const size_t w = size_t(spec_.region_width());
+  const Layer* layer = nullptr;
+  for (const Layer& l : layers_)
+    if (l.name == pass) layer = &l;
+  require(layer || pass == kSampleCount, "the pass '" + pass + "' is not part of this render");
+  const bool mean = layer && find_rule(pass)->keep == Keep::kMean;
+  for (size_t tile = 0; tile < tiles_.size(); ++tile) {
+    const Tile& t = tiles_[tile];
+    const std::lock_guard lock(tile_mutex_[tile]);
+    for (int y = t.y0; y < t.y1; ++y) {
+      for (int x = t.x0; x < t.x1; ++x) {
+        const size_t pixel = size_t(y) * w + size_t(x);
+        if (!layer) {
+          out[pixel] = float(count_[pixel]);
+          continue;
+        }
+        const size_t c = size_t(layer->channels);
+        const float scale = !mean ? 1.0f : count_[pixel] ? 1.0f / float(count_[pixel]) : 0.0f;
+        for (size_t k = 0; k < c; ++k) out[pixel * c + k] = layer->sum[pixel * c + k] * scale;
+      }
+    }
+  }
+}
+
+float Film::relative_error() const {
+  const size_t pixels = count_.size();
+  double total = 0;
+  for (size_t i = 0; i < pixels; ++i) {
+    if (count_[i] < 2) return kInf;
+    total += luminance_sum_[i] / float(count_[i]);
+  }
+  const float floor = std::max(float(0.1 * total / double(pixels)), 1e-12f);
+  std::vector<float> error(pixels);
+  for (size_t i = 0; i < pixels; ++i) {
+    const double n = count_[i], mean = luminance_sum_[i] / n;
+    const double variance = std::max(0.0, luminance_square_sum_[i] / n - mean * mean) * n / (n - 1);
+    error[i] = float(std::sqrt(variance / n) / std::max(std::abs(mean), double(floor)));
+  }
+  const size_t rank = std::min(pixels - 1, size_t(0.95 * double(pixels)));
+  std::nth_element(error.begin(), error.begin() + ptrdiff_t(rank), error.end());
+  return error[rank];
+}
+
+size_t Film::memory_bytes() const {
+  size_t bytes = count_.size() * 12;
+  for (const Layer& layer : layers_) bytes += layer.sum.size() * 4;
+  return bytes;
+}
+
+}  // namespace gi

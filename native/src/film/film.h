@@ -1,0 +1,84 @@
+// The film: sums of samples per pixel for every pass asked for, and the moments that noise is judged by.
+// A pixel's samples are added in the order of the passes, so the image does not depend on threads.
+#pragma once
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "core/vec.h"
+#include "film/filter.h"
+
+namespace gi {
+
+struct FilmSpec {
+  int width = 0, height = 0;                // the full frame
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;       // what is rendered of it; row 0 is the bottom
+  FilterKind filter = FilterKind::kBlackmanHarris;
+  float filter_width = 1.5f;
+  float exposure = 1;
+  bool transparent = false, transparent_glass = false;
+  float transparent_roughness = 0.1f;
+  std::vector<std::string> passes{"Combined"};
+  int region_width() const { return x1 - x0; }
+  int region_height() const { return y1 - y0; }
+};
+
+// What one sample says of its pixel. Positions and normals are of the first surface that is not see-through.
+struct PixelSample {
+  Rgb radiance;
+  float alpha = 1;
+  Rgb emission, environment, albedo;
+  bool has_surface = false;
+  float depth = 1e10f;
+  Vec3 position, normal;
+  Vec2 uv;
+  bool has_uv = false;
+  float object_index = 0, material_index = 0;
+};
+
+struct Tile {
+  int x0, y0, x1, y1;  // within the region
+};
+
+class Film {
+ public:
+  explicit Film(FilmSpec spec);
+
+  const FilmSpec& spec() const { return spec_; }
+  const PixelFilter& filter() const { return filter_; }
+  const std::vector<Tile>& tiles() const { return tiles_; }
+
+  // Adds one sample to each pixel of the tile, row by row.
+  void add_tile(int tile, int pass, const std::vector<PixelSample>& samples);
+
+  // Mean of a pass, (region height × region width × channels); "Sample Count" is the number itself.
+  static int channels(const std::string& pass);  // 0 if there is no such pass
+  void read(const std::string& pass, float* out) const;
+
+  // The 95th percentile over pixels of the standard error of luminance relative to the pixel (but no less than to a
+  // tenth of the image's mean, so that black pixels can come to an end). Infinite before two samples.
+  float relative_error() const;
+  uint64_t bad_samples() const { return bad_samples_; }  // not finite, left out
+  size_t memory_bytes() const;
+
+ private:
+  struct Layer {
+    std::string name;
+    int channels;
+    std::vector<float> sum;
+  };
+  void add_sample(size_t pixel, bool first, PixelSample sample);
+
+  FilmSpec spec_;
+  PixelFilter filter_;
+  std::vector<Tile> tiles_;
+  std::vector<Layer> layers_;
+  std::vector<uint32_t> count_;
+  std::vector<float> luminance_sum_, luminance_square_sum_;
+  std::unique_ptr<std::mutex[]> tile_mutex_;
+  mutable std::mutex stats_mutex_;
+  uint64_t bad_samples_ = 0;
+};
+
+}  // namespace gi
