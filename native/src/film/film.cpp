@@ -6,11 +6,9 @@
 #include "core/check.h"
 
 namespace gi {
-namespace {
 
-constexpr int kTileSize = 16;
-
-enum class Keep { kMean, kFirst };  // averaged over the samples, or of the first sample (indices and depth do not average)
+// Averaged over the samples, or of the first sample (indices and depth do not average).
+enum class Keep { kMean, kFirst };
 
 struct PassRule {
   const char* name;
@@ -18,6 +16,10 @@ struct PassRule {
   Keep keep;
   void (*write)(const PixelSample&, float*);
 };
+
+namespace {
+
+constexpr int kTileSize = 16;
 
 void write_rgb(Rgb c, float* out) { out[0] = c.r, out[1] = c.g, out[2] = c.b; }
 void write_vec(Vec3 v, float* out) { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
@@ -65,7 +67,7 @@ Film::Film(FilmSpec spec) : spec_(std::move(spec)), filter_(spec_.filter, spec_.
     if (name == kSampleCount) continue;  // count_ is always there
     const PassRule* rule = find_rule(name);
     require(rule, "there is no pass named '" + name + "'");
-    layers_.push_back({name, rule->channels, std::vector<float>(pixels * size_t(rule->channels), 0.0f)});
+    layers_.push_back({rule, std::vector<float>(pixels * size_t(rule->channels), 0.0f)});
   }
   count_.assign(pixels, 0);
   luminance_sum_.assign(pixels, 0.0f);
@@ -84,7 +86,6 @@ void Film::add_sample(size_t pixel, bool first, PixelSample s) {
   if (!is_finite(s.radiance) || !std::isfinite(s.alpha)) {
     // The sample still counts for the other passes' sake; its light is left out and the number of such samples reported.
     s.radiance = Rgb(), s.alpha = std::isfinite(s.alpha) ? s.alpha : 1.0f;
-    const std::lock_guard lock(stats_mutex_);
     ++bad_samples_;
   }
   s.radiance *= spec_.exposure, s.emission *= spec_.exposure, s.environment *= spec_.exposure;
@@ -93,15 +94,15 @@ void Film::add_sample(size_t pixel, bool first, PixelSample s) {
   luminance_sum_[pixel] += y;
   luminance_square_sum_[pixel] += y * y;
   for (Layer& layer : layers_) {
-    const PassRule& rule = *find_rule(layer.name);
     float value[4];
-    rule.write(s, value);
-    float* sum = layer.sum.data() + pixel * size_t(layer.channels);
-    if (rule.keep == Keep::kFirst) {
-      if (first) std::copy_n(value, layer.channels, sum);
+    layer.rule->write(s, value);
+    const int n = layer.rule->channels;
+    float* sum = layer.sum.data() + pixel * size_t(n);
+    if (layer.rule->keep == Keep::kFirst) {
+      if (first) std::copy_n(value, n, sum);
       continue;
     }
-    for (int c = 0; c < layer.channels; ++c)
+    for (int c = 0; c < n; ++c)
       if (std::isfinite(value[c])) sum[c] += value[c];
   }
 }
@@ -110,9 +111,9 @@ void Film::read(const std::string& pass, float* out) const {
   const size_t w = size_t(spec_.region_width());
   const Layer* layer = nullptr;
   for (const Layer& l : layers_)
-    if (l.name == pass) layer = &l;
+    if (pass == l.rule->name) layer = &l;
   require(layer || pass == kSampleCount, "the pass '" + pass + "' is not part of this render");
-  const bool mean = layer && find_rule(pass)->keep == Keep::kMean;
+  const bool mean = layer && layer->rule->keep == Keep::kMean;
   for (size_t tile = 0; tile < tiles_.size(); ++tile) {
     const Tile& t = tiles_[tile];
     const std::lock_guard lock(tile_mutex_[tile]);
@@ -123,7 +124,7 @@ void Film::read(const std::string& pass, float* out) const {
           out[pixel] = float(count_[pixel]);
           continue;
         }
-        const size_t c = size_t(layer->channels);
+        const size_t c = size_t(layer->rule->channels);
         const float scale = !mean ? 1.0f : count_[pixel] ? 1.0f / float(count_[pixel]) : 0.0f;
         for (size_t k = 0; k < c; ++k) out[pixel * c + k] = layer->sum[pixel * c + k] * scale;
       }

@@ -1,6 +1,7 @@
 // The film: sums of samples per pixel for every pass asked for, and the moments that noise is judged by.
 // A pixel's samples are added in the order of the passes, so the image does not depend on threads.
 #pragma once
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -37,6 +38,8 @@ struct PixelSample {
   float object_index = 0, material_index = 0;
 };
 
+struct PassRule;  // what a pass holds and how it is averaged: film.cpp
+
 struct Tile {
   int x0, y0, x1, y1;  // within the region
 };
@@ -64,8 +67,7 @@ class Film {
 
  private:
   struct Layer {
-    std::string name;
-    int channels;
+    const PassRule* rule;
     std::vector<float> sum;
   };
   void add_sample(size_t pixel, bool first, PixelSample sample);
@@ -77,8 +79,7 @@ class Film {
   std::vector<uint32_t> count_;
   std::vector<float> luminance_sum_, luminance_square_sum_;
   std::unique_ptr<std::mutex[]> tile_mutex_;
-  mutable std::mutex stats_mutex_;
-  uint64_t bad_samples_ = 0;
+  std::atomic<uint64_t> bad_samples_{0};
 };
 
 }  // namespace gi

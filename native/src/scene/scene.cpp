@@ -59,16 +59,15 @@ void Scene::place_meshes() {
 }
 
 void Scene::resolve_attributes() {
-  attribute_index_.resize(data_.meshes.size());
-  for (size_t m = 0; m < data_.meshes.size(); ++m) {
-    const MeshData& mesh = data_.meshes[m];
-    for (const std::string& slot : data_.attribute_names) {
-      const std::string& name = slot.empty() ? mesh.active_uv : slot;
-      int found = -1;
+  for (const MeshData& mesh : data_.meshes) {
+    const auto find = [&](const std::string& name) {
       for (size_t a = 0; a < mesh.attributes.size() && !name.empty(); ++a)
-        if (mesh.attributes[a].name == name) found = int(a);
-      attribute_index_[m].push_back(found);
-    }
+        if (mesh.attributes[a].name == name) return int32_t(a);
+      return int32_t(-1);
+    };
+    active_uv_.push_back(find(mesh.active_uv));
+    std::vector<int32_t>& slots = attribute_index_.emplace_back();
+    for (const std::string& name : data_.attribute_names) slots.push_back(name.empty() ? active_uv_.back() : find(name));
   }
 }
 
@@ -228,7 +227,21 @@ Rgb Scene::world_radiance(Vec3 direction, const PathState& path) const {
   return run_emission(data_.world.program, point);
 }
 
+void Scene::count_ray() const {
+  static std::atomic<size_t> threads{0};
+  static thread_local const size_t mine = threads++ % kRayCounters;
+  std::atomic<uint64_t>& counter = rays_[mine].value;
+  counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+}
+
+uint64_t Scene::rays_traced() const {
+  uint64_t sum = 0;
+  for (const RayCounter& c : rays_) sum += c.value.load(std::memory_order_relaxed);
+  return sum;
+}
+
 Rgb Scene::transmittance(const Ray& ray, const PathState& path) const {
+  count_ray();
   if (accel_->occluded(ray, kRayShadow)) return Rgb();
   Rgb passed(1.0f);
   if (!any_transparent_) return passed;
@@ -263,11 +276,23 @@ bool Scene::attribute(const ShadingPoint& point, int slot, float out[4]) const {
     return false;
   }
   const MeshData& mesh = data_.meshes[placed.mesh];
-  const AttributeData& a = mesh.attributes[size_t(index)];
+  interpolate(mesh, mesh.attributes[size_t(index)], point, out);
+  return true;
+}
+
+bool Scene::active_uv(const ShadingPoint& point, float out[4]) const {
+  out[0] = out[1] = out[2] = 0.0f, out[3] = 1.0f;
+  const int index = point.mesh == kNoId ? -1 : active_uv_[point.mesh];
+  if (index < 0) return false;
+  interpolate(data_.meshes[point.mesh], data_.meshes[point.mesh].attributes[size_t(index)], point, out);
+  return true;
+}
+
+void Scene::interpolate(const MeshData& mesh, const AttributeData& a, const ShadingPoint& point, float out[4]) const {
   const size_t n = size_t(a.components);
   if (a.domain == Domain::kFace) {
     std::copy_n(a.data.data + size_t(mesh.tri_face[point.triangle]) * n, n, out);
-    return true;
+    return;
   }
   const int32_t* corner = mesh.tri_corner.data + 3 * size_t(point.triangle);
   const float w[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
@@ -277,7 +302,6 @@ bool Scene::attribute(const ShadingPoint& point, int slot, float out[4]) const {
     for (size_t c = 0; c < n; ++c) sum[c] += w[k] * a.data[at * n + c];
   }
   std::copy_n(sum, n, out);
-  return true;
 }
 
 bool Scene::uv_tangents(const ShadingPoint& point, int slot, Vec3& dp_du, Vec3& dp_dv) const {

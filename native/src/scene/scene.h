@@ -1,6 +1,8 @@
 // The scene that integrators trace: geometry, what it is made of and what can be asked at a point.
 // Embree lives behind Accel (accel.h) and shows nowhere else. Light selection is in lights/.
 #pragma once
+#include <array>
+#include <atomic>
 #include <memory>
 #include <span>
 
@@ -28,7 +30,10 @@ class Scene {
   Scene(const Scene&) = delete;
 
   // Nearest hit of a ray of `visibility` (RayKind bits) within [t_min, t_max].
-  std::optional<Hit> intersect(const Ray& ray, uint32_t visibility) const { return accel_->intersect(ray, visibility); }
+  std::optional<Hit> intersect(const Ray& ray, uint32_t visibility) const {
+    count_ray();
+    return accel_->intersect(ray, visibility);
+  }
   // Fraction of light that passes along a shadow ray: 0 or 1 for opaque scenes, programs decide for transparent surfaces.
   Rgb transmittance(const Ray& ray, const PathState& path) const;
 
@@ -59,24 +64,36 @@ class Scene {
   // The attribute in slot `slot` (SceneData::attribute_names; "" is the active UV map) at the point; falls back on object
   // and instancer attributes. False if the object has none. Missing components: 0, alpha 1.
   bool attribute(const ShadingPoint& point, int slot, float out[4]) const;
+  bool active_uv(const ShadingPoint& point, float out[4]) const;  // the UV map that renders by default
   // Directions ∂P/∂u, ∂P/∂v of a UV map over the surface, world space. False if there is none or it is degenerate.
   bool uv_tangents(const ShadingPoint& point, int slot, Vec3& dp_du, Vec3& dp_dv) const;
 
   std::string embree_description() const { return accel_->description(); }
   size_t memory_bytes() const;  // geometry and acceleration structure
+  uint64_t rays_traced() const;
 
  private:
+  // Counted apart by thread: a shared counter would cost more than it tells.
+  struct alignas(64) RayCounter {
+    std::atomic<uint64_t> value{0};
+  };
+  static constexpr size_t kRayCounters = 64;
+  void count_ray() const;
+
   void place_meshes();
   void resolve_attributes();
   void build_accel(const std::string& embree, int threads);
   Vec3 vertex(const Instance& instance, uint32_t v) const;
+  void interpolate(const MeshData& mesh, const AttributeData& attribute, const ShadingPoint& point, float out[4]) const;
 
   SceneData data_;
   std::vector<Instance> instances_;
   std::vector<std::vector<int32_t>> attribute_index_;  // per mesh and slot: which of its attributes, or -1
+  std::vector<int32_t> active_uv_;                     // per mesh: which attribute, or -1
   std::vector<std::vector<uint32_t>> indices_;         // per mesh: Embree's index buffer
   std::unique_ptr<ShaderResources> resources_;
   std::unique_ptr<Accel> accel_;
+  mutable std::array<RayCounter, kRayCounters> rays_;
   Bounds bounds_;
   bool any_transparent_ = false;
 };

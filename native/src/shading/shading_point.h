@@ -16,10 +16,14 @@ enum RayKind : uint32_t {
   kRayVolume = 128,
 };
 
+// Lobes that a diffuse bounce may be told not to see (Blender's caustics switches).
+enum CausticFlags : uint8_t { kNoReflectiveCaustics = 1, kNoRefractiveCaustics = 2 };
+
 struct PathState {  // of the ray that arrived
   uint32_t kind = kRayCamera;
   int depth = 0, diffuse_depth = 0, glossy_depth = 0, transmission_depth = 0, transparent_depth = 0, portal_depth = 0;
   float ray_length = 0;
+  uint8_t without = 0;  // CausticFlags: lobes that are left out at the next surface
 };
 
 inline constexpr uint32_t kNoId = 0xffffffffu;

@@ -1,0 +1,84 @@
+// What an integrator is: passes that each add one estimate of the whole image. A new one is one .cpp file with its
+// descriptor at the end, and one line in registry.cpp; panels, options and tests come from the descriptor.
+#pragma once
+#include <atomic>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/parallel.h"
+#include "core/sampler.h"
+#include "film/film.h"
+#include "lights/lights.h"
+#include "scene/camera.h"
+#include "scene/scene.h"
+
+namespace gi {
+
+struct RenderContext {
+  const Scene& scene;
+  const LightSet& lights;
+  const Camera& camera;
+  ThreadPool& pool;
+  uint32_t seed = 0;
+  const std::atomic<bool>& cancelled;
+  std::atomic<int>& tiles_done;  // of the pass under way
+};
+
+// A value that the user sets. Numbers, switches and choices are all kept as a double (a choice by its index).
+struct Parameter {
+  enum class Kind { kInt, kFloat, kBool, kChoice };
+  struct Item {
+    const char* id;
+    const char* label;
+    const char* help;
+  };
+  const char* name;
+  const char* label;
+  Kind kind;
+  double value, min, max;
+  const char* help;
+  const char* unit = "";
+  std::vector<Item> items = {};
+};
+
+// The parameters of one render: what the user set, checked, and defaults for the rest.
+class Parameters {
+ public:
+  // Values are numbers or, for choices, an item's id. Throws InputError naming the parameter and what it may be.
+  Parameters(const std::vector<Parameter>& declared, const std::map<std::string, std::string>& given, const std::string& integrator);
+  double number(const std::string& name) const { return values_.at(name); }
+  float real(const std::string& name) const { return float(number(name)); }
+  int integer(const std::string& name) const { return int(number(name)); }
+  bool on(const std::string& name) const { return number(name) != 0.0; }
+
+ private:
+  std::map<std::string, double> values_;
+};
+
+class Integrator {
+ public:
+  virtual ~Integrator() = default;
+  virtual void prepare(const RenderContext&) {}                               // once per scene: caches, tables
+  virtual void render_pass(const RenderContext&, int pass, Film&) = 0;        // adds one estimate of the whole image
+  virtual void finish_pass(const RenderContext&, int pass) { (void)pass; }    // learn, merge
+};
+
+struct Descriptor {
+  const char* id;
+  const char* label;
+  const char* blurb;
+  std::vector<Parameter> parameters;
+  std::unique_ptr<Integrator> (*create)(const Parameters&);
+};
+
+const std::vector<Descriptor>& integrators();
+const Descriptor& find_integrator(const std::string& id);  // throws InputError naming the valid ids
+
+// Calls f(camera ray, sampler) for every pixel of the film and adds what it returns, tile by tile in threads.
+using PixelFunction = std::function<PixelSample(const CameraRay&, Sampler&)>;
+void for_each_pixel(const RenderContext& context, int pass, Film& film, const PixelFunction& f);
+
+}  // namespace gi

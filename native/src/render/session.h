@@ -1,0 +1,66 @@
+// One render: runs an integrator's passes in the background until it has enough, and answers what is asked meanwhile.
+#pragma once
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "integrators/integrator.h"
+
+namespace gi {
+
+struct RenderSettings {
+  std::string integrator = "path";
+  int samples = 128;        // passes; 0: no limit of this kind
+  double time_limit = 0;    // seconds of sampling; 0: none
+  float noise_target = 0;   // of Film::relative_error; 0: none
+  uint32_t seed = 0;
+  int threads = 0;          // 0: all
+  std::map<std::string, std::string> parameters;
+};
+
+struct Progress {
+  int passes = 0;        // finished
+  double fraction = 0;   // of the work asked for, by whichever limit is nearest
+  double seconds = 0;    // of sampling
+  double remaining = 0;  // estimate; infinite while unknown
+  uint64_t rays = 0;
+  float noise = kInf;    // last measured Film::relative_error
+  uint64_t bad_samples = 0;
+  size_t memory = 0;     // bytes: scene and film
+  bool done = false, cancelled = false;
+  std::string error;
+};
+
+class Session {
+ public:
+  // The scene must outlive the session. Throws InputError.
+  Session(const Scene& scene, const Camera& camera, FilmSpec film, RenderSettings settings);
+  ~Session();  // cancels and waits
+  void start();
+  bool wait(double seconds);  // true once it has ended
+  void cancel();
+  Progress progress() const;
+  const Film& film() const { return film_; }
+
+ private:
+  void run();
+  bool enough(int passes, double seconds, float noise) const;
+
+  const Scene& scene_;
+  Camera camera_;
+  Film film_;
+  RenderSettings settings_;
+  std::unique_ptr<Integrator> integrator_;
+  std::atomic<bool> cancelled_{false};
+  std::atomic<int> tiles_done_{0};
+  std::thread thread_;
+  mutable std::mutex mutex_;
+  std::condition_variable ended_;
+  Progress progress_;
+  double pass_started_ = 0;
+  std::atomic<uint64_t> rays_before_{0};
+};
+
+}  // namespace gi

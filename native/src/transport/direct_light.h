@@ -1,0 +1,99 @@
+// Direct light, both ways: by choosing a light and a direction to it, and by what a ray meets by itself.
+// The two are weighed by multiple importance sampling. [Veach 1997, ch. 9]
+#pragma once
+#include "integrators/integrator.h"
+#include "transport/path_state.h"
+
+namespace gi {
+
+enum class LightSampling { kOff, kOn, kMis };
+
+// Where a ray started and with which density its direction was drawn. Camera rays and delta lobes: infinite.
+struct RayOrigin {
+  LightQuery query;
+  float pdf_dir = kInf;
+};
+
+inline LightQuery light_query(const ShadingPoint& point, const Bsdf& bsdf) {
+  return {point.position, point.ns, (bsdf.flags() & kTransmission) != 0, point.path};
+}
+
+// Weight of light that a ray found by itself, against light sampling's density for the same direction.
+inline float found_weight(LightSampling mode, float pdf_ray, float pdf_light) {
+  if (mode == LightSampling::kOff || !(pdf_light > 0.0f) || !std::isfinite(pdf_ray)) return 1.0f;
+  return mode == LightSampling::kOn ? 0.0f : power_heuristic(pdf_ray, pdf_light);
+}
+
+// f |cos| of the point for a sampled light, with the lamp's per-component factors where it has any.
+inline LobeEval eval_for_light(const Bsdf& bsdf, Vec3 wo, const LightSample& light) {
+  LobeEval e = bsdf.eval(wo, light.wi);
+  if (light.diffuse_scale == 1 && light.glossy_scale == 1 && light.transmission_scale == 1) return e;
+  const bool below = dot(bsdf.geometric_normal(), light.wi) < 0.0f;
+  if (below) {
+    e.value *= light.transmission_scale;
+  } else {
+    e.value = bsdf.eval(wo, light.wi, kDiffuse).value * light.diffuse_scale + bsdf.eval(wo, light.wi, kGlossy).value * light.glossy_scale;
+  }
+  return e;
+}
+
+// The share of a sampled light that arrives: what lies between is looked at last.
+inline Rgb shadowed(const RenderContext& context, const ShadingPoint& point, const LightSample& light, Rgb contribution) {
+  if (!light.cast_shadow || is_black(contribution)) return contribution;
+  const Ray ray{offset_point(point.position, point.ng, light.wi), light.wi, 0.0f,
+                std::isfinite(light.distance) ? light.distance * (1.0f - 1e-4f) : kInf};
+  return contribution * context.scene.transmittance(ray, point.path);
+}
+
+// One light, chosen by its importance: f cos L V / p, weighed.
+inline Rgb sample_direct_light(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, LightSampling mode,
+                               float u_choice, Vec2 u) {
+  if (mode == LightSampling::kOff || bsdf.is_delta()) return Rgb();
+  const auto light = context.lights.sample(light_query(point, bsdf), u_choice, u);
+  if (!light || is_black(light->radiance) || !(light->pdf_dir > 0.0f)) return Rgb();
+  const LobeEval e = eval_for_light(bsdf, point.wo, *light);
+  const bool found_otherwise = mode == LightSampling::kMis && !light->is_delta && light->use_mis;
+  const float weight = found_otherwise ? power_heuristic(light->pdf_dir, e.pdf_dir) : 1.0f;
+  return shadowed(context, point, *light, e.value * light->radiance * (weight / light->pdf_dir));
+}
+
+// Lamps that a ray passes on its way to a surface at `t_surface`: they do not block it.
+inline Rgb lamps_along(const RenderContext& context, Ray ray, float t_surface, const RayOrigin& from, LightSampling mode,
+                       uint32_t visibility) {
+  Rgb sum;
+  ray.t_max = t_surface;
+  while (const auto hit = context.lights.intersect_lamp(ray, visibility)) {
+    const LightEval e = context.lights.eval_lamp(from.query, ray, *hit);
+    sum += e.radiance * found_weight(mode, from.pdf_dir, e.pdf_dir);
+    ray.t_min = std::nextafter(hit->t, kInf) + 1e-6f * hit->t;
+  }
+  return sum;
+}
+
+// Suns and the world, seen by a ray that leaves the scene.
+inline Rgb light_beyond(const RenderContext& context, const Ray& ray, const RayOrigin& from, LightSampling mode, const PathState& path) {
+  const uint32_t visibility = visibility_of(path.kind);
+  Rgb sum;
+  for (uint32_t sun = 0; sun < context.lights.sun_count(); ++sun) {
+    const LightEval e = context.lights.eval_sun(sun, from.query, ray.direction, visibility);
+    if (!is_black(e.radiance)) sum += e.radiance * found_weight(mode, from.pdf_dir, e.pdf_dir);
+  }
+  if (context.scene.data().world.visibility & visibility) {
+    const Rgb radiance = context.scene.world_radiance(ray.direction, path);
+    if (!is_black(radiance)) {
+      const bool weighed = mode != LightSampling::kOff && std::isfinite(from.pdf_dir);
+      sum += radiance * (weighed ? found_weight(mode, from.pdf_dir, context.lights.pdf_world(from.query, ray.direction)) : 1.0f);
+    }
+  }
+  return sum;
+}
+
+// Emission of the surface that a ray met, weighed.
+inline Rgb surface_emission(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, const RayOrigin& from,
+                            LightSampling mode, float t) {
+  if (is_black(bsdf.emission)) return Rgb();
+  const bool weighed = mode != LightSampling::kOff && std::isfinite(from.pdf_dir);
+  return bsdf.emission * (weighed ? found_weight(mode, from.pdf_dir, context.lights.pdf_triangle(from.query, point, t)) : 1.0f);
+}
+
+}  // namespace gi
