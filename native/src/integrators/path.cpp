@@ -1,0 +1,212 @@
+// Path tracing [Kajiya 1986] with Russian roulette and multiple importance sampling [Veach 1997].
+// Each bounce: continue with probability α; draw ω from P; weigh by ρbd cos θ / (P(ω) α); add Le where a luminaire is met.
+#include "transport/direct_light.h"
+#include "transport/first_hit.h"
+
+namespace gi {
+namespace {
+
+enum class DirectionSampling { kUniform, kCosine, kBsdf };
+enum class Continuation { kAlbedo, kThroughput, kConstant };
+
+// One bounce takes at most this many dimension pairs, so that later bounces stay stratified.
+constexpr uint32_t kPairsPerBounce = 8;
+
+struct PathSettings {
+  LightSampling light_sampling;
+  DirectionSampling direction_sampling;
+  Continuation continuation;
+  float constant;
+  int min_bounces;
+  BounceLimits limits;
+  float clamp_direct, clamp_indirect;
+  bool reflective_caustics, refractive_caustics;
+};
+
+// The direction of the next ray from P(ω). Uniform and cosine replace what the BSDF would draw, except for delta lobes,
+// which nothing else can hit.
+std::optional<BsdfSample> sample_direction(const Bsdf& bsdf, const ShadingPoint& point, DirectionSampling mode, Vec2 u, float u_lobe) {
+  if (mode == DirectionSampling::kBsdf) return bsdf.sample(point.wo, u, u_lobe);
+  const float p_delta = bsdf.delta_probability();
+  if (u_lobe < p_delta) return bsdf.sample_delta(point.wo, u_lobe / p_delta);
+  const bool both_sides = bsdf.flags() & kTransmission;
+  const float side = (u_lobe - p_delta) / (1.0f - p_delta);
+  const bool below = both_sides && side < 0.5f;
+  const bool uniform = mode == DirectionSampling::kUniform;
+  const Vec3 local = uniform ? sample_uniform_hemisphere(u) : sample_cosine_hemisphere(u);
+  const float pdf = (uniform ? 0.5f * kInvPi : local.z * kInvPi) * (both_sides ? 0.5f : 1.0f) * (1.0f - p_delta);
+  const Vec3 n = below ? -point.ns : point.ns;
+  const Vec3 wi = Frame::from_normal(n).to_world(local);
+  const LobeEval e = bsdf.eval(point.wo, wi);
+  if (!(pdf > 0.0f) || is_black(e.value)) return {};
+  const bool diffuse = bsdf.flags() & kDiffuse;
+  return BsdfSample{wi, e.value, pdf, uint8_t((below ? kTransmission : kReflection) | (diffuse ? kDiffuse : kGlossy)), 1.0f};
+}
+
+float continuation_probability(const PathSettings& s, const PathState& path, Rgb throughput, Rgb weight) {
+  if (path.depth <= s.min_bounces) return 1.0f;
+  switch (s.continuation) {
+    case Continuation::kAlbedo: return std::min(1.0f, max_component(weight));
+    case Continuation::kConstant: return s.constant;
+    case Continuation::kThroughput: break;
+  }
+  return std::min(1.0f, std::sqrt(max_component(throughput)));
+}
+
+class PathIntegrator final : public Integrator {
+ public:
+  explicit PathIntegrator(const Parameters& p)
+      : s_{LightSampling(p.integer("light_sampling")), DirectionSampling(p.integer("direction_sampling")),
+           Continuation(p.integer("continuation")), p.real("continuation_constant"), p.integer("min_bounces"),
+           {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"), p.integer("transparent_bounces")},
+           p.real("clamp_direct"), p.real("clamp_indirect"), p.on("caustics_reflective"), p.on("caustics_refractive")} {}
+
+  void render_pass(const RenderContext& context, int pass, Film& film) override {
+    for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler) { return trace(context, film.spec(), camera, sampler); });
+  }
+
+ private:
+  PixelSample trace(const RenderContext& context, const FilmSpec& film, const CameraRay& camera, Sampler& sampler) const {
+    static thread_local Bsdf bsdf;
+    PixelSample result;
+    result.alpha = 0;
+    Ray ray = camera.ray;
+    PathState path;
+    RayOrigin origin;
+    Rgb throughput(1.0f);
+    float travelled = 0;            // along the path, for the footprint
+    bool may_scatter = true;        // false past the bounce limit: the next surface only emits
+    bool seen_from_camera = true;   // nothing but transparent surfaces so far: alpha is decided here
+    origin.query.path = path;
+
+    const auto add = [&](Rgb radiance, int depth) {
+      result.radiance += clamp_contribution(throughput * radiance, depth > 1 ? s_.clamp_indirect : s_.clamp_direct);
+    };
+
+    for (uint32_t bounce = 0;; ++bounce) {
+      sampler.jump_to((bounce + 1) * kPairsPerBounce);
+      const uint32_t visibility = visibility_of(path.kind);
+      const auto hit = context.scene.intersect(ray, visibility);
+
+      // Lamps do not block the ray.
+      add(lamps_along(context, ray, hit ? hit->t : kInf, origin, s_.light_sampling, visibility), path.depth);
+
+      // Leave the scene: suns and the world.
+      if (!hit) {
+        const Rgb beyond = light_beyond(context, ray, origin, s_.light_sampling, path);
+        if (seen_from_camera && film.transparent) break;
+        if (seen_from_camera) result.alpha += average(throughput), result.environment += throughput * beyond;
+        add(beyond, path.depth);
+        break;
+      }
+
+      ShadingPoint point = context.scene.shading_point(ray, *hit, path, camera.footprint + camera.spread * (travelled + hit->t));
+      context.scene.shade(point, bsdf);
+      if (path.depth == 0) record_surface(context, point, bsdf, result);
+
+      // Cut out what is held out.
+      if (seen_from_camera) {
+        const bool whole = context.scene.instances()[point.instance].data->holdout;
+        const Rgb cut = whole ? Rgb(1.0f) - bsdf.transparency : bsdf.holdout;
+        const float covered = average(throughput * (Rgb(1.0f) - bsdf.transparency - cut));
+        result.alpha += std::max(covered, 0.0f);
+        if (whole) {
+          throughput *= bsdf.transparency;
+          if (is_black(throughput)) break;
+          path.transparent_depth++;
+          ray = {offset_point(point.position, point.ng, ray.direction), ray.direction, 0.0f, kInf};
+          continue;
+        }
+      }
+
+      // Add what the surface emits, then what lights send to it.
+      const Rgb emitted = surface_emission(context, point, bsdf, origin, s_.light_sampling, hit->t);
+      if (path.depth == 0) result.emission += throughput * emitted;
+      add(emitted, path.depth);
+      if (may_scatter) {
+        const float u_choice = sampler.next_1d();
+        const Vec2 u_light = sampler.next_2d();
+        add(sample_direct_light(context, point, bsdf, s_.light_sampling, u_choice, u_light), path.depth + 1);
+      }
+
+      // Draw the next direction.
+      const Vec2 u = sampler.next_2d();
+      const float u_lobe = sampler.next_1d();
+      const auto next = sample_direction(bsdf, point, s_.direction_sampling, u, u_lobe);
+      if (!next || !(next->pdf_dir > 0.0f)) break;
+      const bool transparent = next->flags & kTransparent;
+      if (!may_scatter && !transparent) break;
+      const Rgb weight = next->value / next->pdf_dir;
+      throughput *= weight;
+      if (is_black(throughput)) break;
+
+      // Follow it. A transparent surface changes nothing but the throughput: the ray goes on as the one it was.
+      if (transparent) {
+        if (!advance(path, next->flags, s_.limits)) break;
+        travelled += hit->t;
+        const float left = ray.t_max - hit->t;
+        ray = {offset_point(point.position, point.ng, ray.direction), ray.direction, 0.0f, left};
+        origin.query.path = path;
+        continue;
+      }
+      may_scatter = advance(path, next->flags, s_.limits);
+      const bool through_glass = film.transparent_glass && (next->flags & kTransmission) && next->roughness <= film.transparent_roughness;
+      if (!through_glass) seen_from_camera = false;
+      path.without = next->flags & kDiffuse ? no_caustics() : 0;
+      const bool delta = next->flags & kSpecular;
+      origin = {light_query(point, bsdf), delta ? kInf : next->pdf_dir};
+      travelled += hit->t;
+      ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+
+      // Russian roulette.
+      const float alpha = continuation_probability(s_, path, throughput, weight);
+      if (alpha < 1.0f) {
+        if (sampler.next_1d() >= alpha) break;
+        throughput *= 1.0f / alpha;
+      }
+    }
+    result.alpha = film.transparent ? std::clamp(result.alpha, 0.0f, 1.0f) : result.alpha;
+    return result;
+  }
+
+  uint8_t no_caustics() const {
+    return uint8_t((s_.reflective_caustics ? 0 : kNoReflectiveCaustics) | (s_.refractive_caustics ? 0 : kNoRefractiveCaustics));
+  }
+
+  PathSettings s_;
+};
+
+}  // namespace
+
+const Descriptor& path_descriptor() {
+  using Kind = Parameter::Kind;
+  static const Descriptor descriptor{
+      "path",
+      "Path Tracing",
+      "All of global illumination by random walks from the camera; unbiased",
+      {
+          {"light_sampling", "Light Sampling", Kind::kChoice, 2, 0, 2, "How direct light is found", "",
+           {{"OFF", "Off", "Only rays that happen to meet a luminaire count: the naive method, a reference for the others. Point lights and suns without a size are not seen"},
+            {"ON", "On", "A light is chosen at every surface; luminaires that rays meet by chance are left out"},
+            {"MIS", "Multiple Importance", "Both ways, weighed by the power heuristic"}}},
+          {"direction_sampling", "Direction Sampling", Kind::kChoice, 2, 0, 2, "The density P from which directions are drawn", "",
+           {{"UNIFORM", "Uniform", "Every direction of the hemisphere alike"}, {"COSINE", "Cosine", "Proportional to the cosine with the normal"}, {"BSDF", "BSDF", "As the surface scatters"}}},
+          {"continuation", "Continuation", Kind::kChoice, 1, 0, 2, "The probability with which a path goes on after a bounce", "",
+           {{"ALBEDO", "Albedo", "What the surface reflects"}, {"THROUGHPUT", "Throughput", "Square root of what the whole path still carries"}, {"CONSTANT", "Constant", "A fixed number"}}},
+          {"continuation_constant", "Constant", Kind::kFloat, 0.7, 0.01, 1, "Probability of going on where it is constant"},
+          {"min_bounces", "Minimum Bounces", Kind::kInt, 0, 0, 1024, "Bounces before roulette begins"},
+          {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
+          {"diffuse_bounces", "Diffuse", Kind::kInt, 4, 0, 1024, "Diffuse reflections"},
+          {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},
+          {"transmission_bounces", "Transmission", Kind::kInt, 12, 0, 1024, "Refractions"},
+          {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
+          {"clamp_direct", "Clamp Direct", Kind::kFloat, 0, 0, 1e9, "Largest radiance that one sample may add directly; 0 is off. Loses light"},
+          {"clamp_indirect", "Clamp Indirect", Kind::kFloat, 0, 0, 1e9, "Largest radiance that one sample may add after a bounce; 0 is off. Loses light"},
+          {"caustics_reflective", "Reflective Caustics", Kind::kBool, 1, 0, 1, "Mirrors and glossy surfaces seen by diffuse ones"},
+          {"caustics_refractive", "Refractive Caustics", Kind::kBool, 1, 0, 1, "Glass seen by diffuse surfaces"},
+      },
+      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<PathIntegrator>(p); }};
+  return descriptor;
+}
+
+}  // namespace gi
