@@ -23,24 +23,29 @@ struct PathSettings {
   bool reflective_caustics, refractive_caustics;
 };
 
+// Density of P towards `wi` about the shading normal, for the ways of drawing that know nothing of the BSDF.
+float pdf_direction(const Bsdf& bsdf, const ShadingPoint& point, DirectionSampling mode, Vec3 wi) {
+  const bool both_sides = bsdf.flags() & kTransmission;
+  const float cosine = dot(point.ns, wi);
+  if (cosine < 0.0f && !both_sides) return 0.0f;
+  const float pdf = mode == DirectionSampling::kUniform ? 0.5f * kInvPi : std::abs(cosine) * kInvPi;
+  return pdf * (both_sides ? 0.5f : 1.0f) * (1.0f - bsdf.delta_probability());
+}
+
 // The direction of the next ray from P(ω). Uniform and cosine replace what the BSDF would draw, except for delta lobes,
 // which nothing else can hit.
 std::optional<BsdfSample> sample_direction(const Bsdf& bsdf, const ShadingPoint& point, DirectionSampling mode, Vec2 u, float u_lobe) {
   if (mode == DirectionSampling::kBsdf) return bsdf.sample(point.wo, u, u_lobe);
   const float p_delta = bsdf.delta_probability();
   if (u_lobe < p_delta) return bsdf.sample_delta(point.wo, u_lobe / p_delta);
-  const bool both_sides = bsdf.flags() & kTransmission;
-  const float side = (u_lobe - p_delta) / (1.0f - p_delta);
-  const bool below = both_sides && side < 0.5f;
-  const bool uniform = mode == DirectionSampling::kUniform;
-  const Vec3 local = uniform ? sample_uniform_hemisphere(u) : sample_cosine_hemisphere(u);
-  const float pdf = (uniform ? 0.5f * kInvPi : local.z * kInvPi) * (both_sides ? 0.5f : 1.0f) * (1.0f - p_delta);
-  const Vec3 n = below ? -point.ns : point.ns;
-  const Vec3 wi = Frame::from_normal(n).to_world(local);
+  const bool below = (bsdf.flags() & kTransmission) && (u_lobe - p_delta) < 0.5f * (1.0f - p_delta);
+  const Vec3 local = mode == DirectionSampling::kUniform ? sample_uniform_hemisphere(u) : sample_cosine_hemisphere(u);
+  const Vec3 wi = Frame::from_normal(below ? -point.ns : point.ns).to_world(local);
   const LobeEval e = bsdf.eval(point.wo, wi);
+  const float pdf = pdf_direction(bsdf, point, mode, wi);
   if (!(pdf > 0.0f) || is_black(e.value)) return {};
-  const bool diffuse = bsdf.flags() & kDiffuse;
-  return BsdfSample{wi, e.value, pdf, uint8_t((below ? kTransmission : kReflection) | (diffuse ? kDiffuse : kGlossy)), 1.0f};
+  const uint8_t kind = bsdf.flags() & kDiffuse ? kDiffuse : kGlossy;
+  return BsdfSample{wi, e.value, pdf, uint8_t((below ? kTransmission : kReflection) | kind), 1.0f};
 }
 
 float continuation_probability(const PathSettings& s, const PathState& path, Rgb throughput, Rgb weight) {
@@ -126,7 +131,10 @@ class PathIntegrator final : public Integrator {
       if (may_scatter) {
         const float u_choice = sampler.next_1d();
         const Vec2 u_light = sampler.next_2d();
-        add(sample_direct_light(context, point, bsdf, s_.light_sampling, u_choice, u_light), path.depth + 1);
+        const auto pdf_of = [&](Vec3 wi, const LobeEval& e) {
+          return s_.direction_sampling == DirectionSampling::kBsdf ? e.pdf_dir : pdf_direction(bsdf, point, s_.direction_sampling, wi);
+        };
+        add(sample_direct_light(context, point, bsdf, s_.light_sampling, u_choice, u_light, pdf_of), path.depth + 1);
       }
 
       // Draw the next direction.

@@ -50,7 +50,7 @@ class WhittedIntegrator final : public Integrator {
       const auto next = bsdf.sample_delta(point.wo, sampler.next_1d());
       if (!next || !advance(path, next->flags, limits_)) break;
       if (!(next->flags & kTransparent)) seen_from_camera = false;
-      throughput *= next->value / next->pdf_dir;
+      throughput *= next->value / next->pdf_dir * bsdf.delta_probability();
       if (is_black(throughput)) break;
       ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
     }

@@ -47,6 +47,8 @@ class LightSet {
   std::optional<LightSample> sample(const LightQuery& query, float u_choice, Vec2 u) const;
   // One given light; pdf_dir then leaves out the choice. u = (½, ½) is its centre (hard shadows).
   std::optional<LightSample> sample_light(uint32_t light, const LightQuery& query, Vec2 u) const;
+  bool has_centre(uint32_t light) const { return light < count() && !is_world(light); }
+  bool is_world(uint32_t light) const;
   uint32_t count() const;  // lamps, emissive triangles, the world
   bool empty() const { return count() == 0; }
 

@@ -194,7 +194,7 @@ ShadingPoint Scene::world_point(Vec3 direction, const PathState& path) const {
 // ---------------------------------------------------------------- shading
 
 void Scene::shade(ShadingPoint& point, Bsdf& bsdf) const {
-  bsdf.clear(point.ng, point.ns);
+  bsdf.clear(point.ng, point.ns, point.path.without);
   material(material_of(point.instance, point.triangle)).program.run(point, *resources_, &bsdf);
   bsdf.finish(point.wo);
 }

@@ -45,16 +45,23 @@ inline Rgb shadowed(const RenderContext& context, const ShadingPoint& point, con
   return contribution * context.scene.transmittance(ray, point.path);
 }
 
-// One light, chosen by its importance: f cos L V / p, weighed.
-inline Rgb sample_direct_light(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, LightSampling mode,
-                               float u_choice, Vec2 u) {
+// One light, chosen by its importance: f cos L V / p, weighed. `pdf_of(wi, e)` is the density with which the next ray
+// would be drawn towards wi.
+template <class PdfOf>
+Rgb sample_direct_light(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, LightSampling mode, float u_choice,
+                        Vec2 u, const PdfOf& pdf_of) {
   if (mode == LightSampling::kOff || bsdf.is_delta()) return Rgb();
   const auto light = context.lights.sample(light_query(point, bsdf), u_choice, u);
   if (!light || is_black(light->radiance) || !(light->pdf_dir > 0.0f)) return Rgb();
   const LobeEval e = eval_for_light(bsdf, point.wo, *light);
   const bool found_otherwise = mode == LightSampling::kMis && !light->is_delta && light->use_mis;
-  const float weight = found_otherwise ? power_heuristic(light->pdf_dir, e.pdf_dir) : 1.0f;
+  const float weight = found_otherwise ? power_heuristic(light->pdf_dir, pdf_of(light->wi, e)) : 1.0f;
   return shadowed(context, point, *light, e.value * light->radiance * (weight / light->pdf_dir));
+}
+
+inline Rgb sample_direct_light(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, LightSampling mode,
+                               float u_choice, Vec2 u) {
+  return sample_direct_light(context, point, bsdf, mode, u_choice, u, [](Vec3, const LobeEval& e) { return e.pdf_dir; });
 }
 
 // Lamps that a ray passes on its way to a surface at `t_surface`: they do not block it.
