@@ -1,0 +1,193 @@
+"""The RenderEngine: what Blender calls, and how errors, progress and images get back to it."""
+
+from __future__ import annotations
+
+import time
+import traceback
+
+import bpy
+import numpy as np
+
+from . import control, native
+from .export import Exported, ExportError, export
+from .passes import contract_name, passes_of
+from .session import UPDATE_SECONDS, RenderFailed, Session
+
+WHOLE = 1 << 16  # begin_result clamps it to the border's size
+PREVIEW_SAMPLES = 32
+USER_ERRORS = (ExportError, RenderFailed, native.NativeMissing, MemoryError, ValueError)
+
+# Said once in an animation, not once a frame.
+_reported: set[str] = set()
+
+
+class GIEngine(bpy.types.RenderEngine):
+    bl_idname = "GI_ENGINE"
+    bl_label = "GI Engine"
+    bl_use_preview = True
+    bl_use_shading_nodes_custom = False  # Blender's own shader nodes
+    bl_use_eevee_viewport = True  # Material Preview
+    bl_use_postprocess = True  # compositing and sequencer
+
+    # Class attributes rather than __init__, whose arguments differ between versions.
+    exported: Exported | None = None
+    failure: Exception | None = None
+
+    def update(self, data=None, depsgraph=None):
+        # Blender holds still here (under its draw lock), so here is where the scene is read.
+        self.exported, self.failure = None, None
+        try:
+            self.update_stats("", "Exporting")
+            control.report(control.Progress(stage="Export"))
+            self.exported = self.export(depsgraph)
+        except Exception as error:  # told in render(), which must run: a result that is never begun crashes Blender
+            self.failure = error
+
+    def export(self, depsgraph) -> Exported:
+        overrides = control.current.overrides if control.current else {}
+        found = export(depsgraph, native.integrators(), self, (self.resolution_x, self.resolution_y), overrides.get("integrator"))
+        found.settings = control.apply(found.settings)
+        if self.is_preview:
+            found.settings.samples = min(found.settings.samples, PREVIEW_SAMPLES)
+        return found
+
+    def render(self, depsgraph):
+        views = [view.name for view in self.views()] or [""]
+        for view in views:
+            self.render_view(depsgraph, view)
+
+    def views(self) -> list:
+        result = self.get_result()
+        return list(result.views) if result else []
+
+    def render_view(self, depsgraph, view: str) -> None:
+        result = self.begin_result(0, 0, WHOLE, WHOLE, layer=depsgraph.view_layer.name, view=view)
+        # Allocates the passes: saving an EXR crashes Blender where no result was ever merged.
+        self.update_result(result)
+        try:
+            if self.failure:
+                raise self.failure
+            if view:
+                self.active_view_set(view)
+                self.exported = self.export(depsgraph)
+            self.render_result(result)
+            self.end_result(result)
+        except Exception as error:
+            self.end_result(result, cancel=True)
+            self.fail(error)
+
+    def render_result(self, result) -> None:
+        scene, settings = self.exported.scene, self.exported.settings
+        for message in self.exported.warnings:
+            self.warn(message)
+        x0, y0, x1, y1 = scene.film.region
+        if (x1 - x0, y1 - y0) != (result.resolution_x, result.resolution_y):
+            raise RuntimeError(f"border is {x1 - x0}x{y1 - y0} pixels, Blender expects {result.resolution_x}x{result.resolution_y}")
+        self.update_stats("", "Building the scene")
+        control.report(control.Progress(stage="Build"))
+        with Session(scene, settings) as session:
+            self.exported.scene = None  # the native side has taken what it needs
+            for message in session.warnings():
+                self.warn(message)
+            self.stream(session, result)
+
+    def stream(self, session: Session, result) -> None:
+        """Shows the image as it grows until it is done or the user has had enough."""
+        shown = time.monotonic()
+        while not session.wait():
+            if self.test_break() or control.cancelled():
+                session.native.cancel()
+                break
+            if time.monotonic() - shown >= UPDATE_SECONDS:
+                self.show(session, result)
+                shown = time.monotonic()
+            self.tell(session.progress())
+        self.show(session, result)
+        self.tell(session.progress())
+
+    def show(self, session: Session, result) -> None:
+        for blender_pass in result.layers[0].passes:
+            name = contract_name(blender_pass.name)
+            if name:
+                blender_pass.rect.foreach_set(np.ascontiguousarray(session.read(name), np.float32).ravel())
+        self.update_result(result)
+
+    def tell(self, progress: dict) -> None:
+        self.update_progress(progress["fraction"])
+        left = seconds_left(progress)
+        memory = progress.get("memory", 0) / 2**20
+        self.update_memory_stats(memory_used=memory, memory_peak=memory)
+        self.update_stats("", status(progress, left))
+        control.report(
+            control.Progress(
+                stage="Render",
+                fraction=progress["fraction"],
+                passes=progress["passes"],
+                rays=progress["rays"],
+                seconds=progress["seconds"],
+                seconds_left=left,
+                noise=progress.get("noise"),
+            )
+        )
+
+    def warn(self, message: str) -> None:
+        control.warn(message)
+        if message not in _reported and not self.is_preview:
+            _reported.add(message)
+            self.report({"WARNING"}, message)
+
+    def fail(self, error: Exception) -> None:
+        # Only report() makes the operator fail and keeps Blender from writing a file; error_set is for the window.
+        message = describe(error)
+        control.fail(message)
+        if not bpy.app.background:
+            self.error_set(message)
+        self.report({"ERROR"}, message)
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        for p in passes_of(renderlayer):
+            self.register_pass(scene, renderlayer, p.blender_name, len(p.channels), p.channels, p.kind)
+
+
+def describe(error: Exception) -> str:
+    """One line for the user; what was not foreseen leaves its traceback on the console."""
+    if isinstance(error, MemoryError):
+        return "out of memory"
+    if not isinstance(error, USER_ERRORS):
+        traceback.print_exception(error)
+        return f"internal error: {type(error).__name__}: {error}"
+    return str(error)
+
+
+def seconds_left(progress: dict) -> float | None:
+    fraction = progress["fraction"]
+    return progress["seconds"] * (1 - fraction) / fraction if fraction > 0 else None
+
+
+def status(progress: dict, left: float | None) -> str:
+    rate = progress["rays"] / progress["seconds"] * 1e-6 if progress["seconds"] > 0 else 0
+    parts = [f"Sample {progress['samples_per_pixel']:.0f}", f"{rate:.1f} Mrays/s"]
+    if left is not None:
+        minutes, seconds = divmod(int(left), 60)
+        parts.insert(0, f"Remaining {minutes:02d}:{seconds:02d}")
+    return " | ".join(parts)
+
+
+@bpy.app.handlers.persistent
+def forget_warnings(*_):
+    _reported.clear()
+
+
+HANDLERS = (bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel, bpy.app.handlers.load_post)
+
+
+def register() -> None:
+    bpy.utils.register_class(GIEngine)
+    for handlers in HANDLERS:
+        handlers.append(forget_warnings)
+
+
+def unregister() -> None:
+    for handlers in HANDLERS:
+        handlers.remove(forget_warnings)
+    bpy.utils.unregister_class(GIEngine)

@@ -1,0 +1,105 @@
+"""Blender's depsgraph to scene_data: the whole scene, its settings and what could not be taken along.
+
+Everything is read here, while Blender's data holds still; nothing is read while rendering.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..scene_data import Scene, Settings
+from .camera import export_camera
+from .film import export_film, frame_size
+from .lights import export_light
+from .mesh import export_mesh
+from .objects import Collected, collect, place, stack_matrices
+from .settings import export_settings, resolve
+from .shaders import Shaders
+from .warnings import Warnings
+from .world import export_world
+
+
+@dataclass
+class Exported:
+    scene: Scene
+    settings: Settings
+    warnings: list[str]
+
+
+class ExportError(ValueError):
+    """The scene cannot be rendered; the message is for the user."""
+
+
+def export(depsgraph, descriptors: list[dict], engine=None, size=None, integrator: str | None = None) -> Exported:
+    """`descriptors`: the integrators'. `engine`: the RenderEngine, where there is one (stereo, camera override).
+
+    `size` is the full frame's in pixels; by default the scene's. `integrator` overrides the scene's.
+    """
+    warnings = Warnings()
+    scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer_eval
+    width, height = size or frame_size(scene.render)
+    out = Scene()
+    out.camera = export_active_camera(engine, depsgraph, width, height, warnings)
+    out.film = export_film(scene, view_layer, resolve(scene, view_layer), (width, height))
+    found = collect(depsgraph, warnings)
+    shaders = Shaders(out, depsgraph, warnings)
+    world = getattr(view_layer, "world_override", None) or scene.world
+    out.world = export_world(world, shaders.world(world) if world else -1)
+    export_lights(out, found, shaders)
+    export_objects(out, found, shaders, warnings)
+    note_unsupported(scene, found, warnings)
+    settings = export_settings(scene, view_layer, descriptors, integrator)
+    return Exported(out, settings, warnings.messages())
+
+
+def export_active_camera(engine, depsgraph, width: int, height: int, warnings: Warnings):
+    scene = depsgraph.scene_eval
+    camera = (engine.camera_override if engine else None) or scene.camera
+    if camera is None:
+        raise ExportError(f'scene "{scene.name}" has no camera')
+    try:
+        return export_camera(engine, camera.evaluated_get(depsgraph), scene.render, width, height, warnings)
+    except ValueError as error:
+        raise ExportError(str(error)) from error
+
+
+def export_lights(out: Scene, found: Collected, shaders: Shaders) -> None:
+    matrices = stack_matrices([entry[2] for entry in found.lights])
+    for (name, light, _, visibility), matrix in zip(found.lights, matrices, strict=True):
+        lamp = export_light(name, light, matrix, visibility, shaders.light(light))
+        if lamp:
+            out.lights.append(lamp)
+
+
+def export_objects(out: Scene, found: Collected, shaders: Shaders, warnings: Warnings) -> None:
+    # Programs first: they say which attributes the meshes have to bring.
+    slots = [shaders.slots(prototype.materials) for prototype in found.prototypes]
+    wanted = shaders.wanted_attributes()
+    if "UV" in out.film.passes:
+        wanted.add("")
+    index_of: dict[int, int | None] = {}
+    for prototype in found.prototypes:
+        key = prototype.mesh.as_pointer()
+        if key not in index_of:
+            index_of[key] = add_mesh(out, prototype, wanted, warnings)
+    meshes = [index_of[prototype.mesh.as_pointer()] for prototype in found.prototypes]
+    values = [shaders.object_attributes(prototype) for prototype in found.prototypes]
+    out.instances = place(found, meshes, slots, values, warnings)
+
+
+def add_mesh(out: Scene, prototype, wanted: set[str], warnings: Warnings) -> int | None:
+    mesh = export_mesh(prototype.mesh, prototype.name, wanted)
+    if mesh is None:
+        # Instancers and curves without a fill have no faces on purpose.
+        if prototype.is_plain:
+            warnings.add("its mesh has no faces; left out", prototype.name)
+        return None
+    out.meshes.append(mesh)
+    return len(out.meshes) - 1
+
+
+def note_unsupported(scene, found: Collected, warnings: Warnings) -> None:
+    if scene.render.use_motion_blur:
+        warnings.add("motion blur is not supported yet; rendered without")
+    for name in found.linked:
+        warnings.add("light linking is not supported yet; it lights everything", name)

@@ -1,0 +1,203 @@
+"""Walks the depsgraph's instances: what is drawn, where, with which materials, seen by which rays.
+
+Curves, text, surfaces and metaballs reach us as the meshes that Blender makes of them. Strands, point clouds and
+volumes are left out, under a warning.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import chain
+
+import bpy
+import numpy as np
+
+from ..scene_data import (
+    CAMERA,
+    DIFFUSE,
+    GLOSSY,
+    SHADOW,
+    TRANSMISSION,
+    VISIBLE_TO_ALL,
+    VOLUME,
+    Instance,
+)
+from .ids import MASK, random_of_name
+from .warnings import Warnings
+
+MATRICES_ARE_BUFFERS = bpy.app.version >= (5, 0, 0)
+UNSUPPORTED = {"CURVES": "hair curves", "POINTCLOUD": "point clouds", "VOLUME": "volumes"}
+VISIBILITY = {
+    "visible_camera": CAMERA,
+    "visible_shadow": SHADOW,
+    "visible_diffuse": DIFFUSE,
+    "visible_glossy": GLOSSY,
+    "visible_transmission": TRANSMISSION,
+    "visible_volume_scatter": VOLUME,
+}
+
+
+@dataclass
+class Prototype:
+    """What all instances of one object (with one mesh, under one instancer) have in common."""
+
+    name: str
+    mesh: object  # bpy Mesh; valid until the depsgraph is evaluated again
+    materials: list  # bpy Material or None, by slot
+    visibility: int
+    color: tuple
+    object_index: int
+    random: float
+    holdout: bool
+    shadow_terminator_offset: float
+    object: object  # bpy Object that object attributes are read from
+    parent: object  # bpy Object that instancer attributes are read from; the same where there is none
+    is_plain: bool  # a mesh object of its own, with nothing that may take its faces away on purpose
+
+
+@dataclass
+class Collected:
+    """The objects of a view layer, before anything big is read."""
+
+    prototypes: list[Prototype] = field(default_factory=list)
+    # One entry an instance: prototype, matrix (16 floats), Random.
+    placed: list[tuple] = field(default_factory=list)
+    lights: list[tuple] = field(default_factory=list)  # name, bpy Light, matrix, visibility
+    linked: list[str] = field(default_factory=list)  # objects with light linking
+
+
+def collect(depsgraph, warnings: Warnings) -> Collected:
+    """Goes through all instances once. Never leaves the loop early: older versions then leak the whole list."""
+    walk = Walk(depsgraph.view_layer_eval, warnings)
+    for instance in depsgraph.object_instances:
+        if instance.show_self:
+            walk.visit(instance)
+    return walk.found
+
+
+class Walk:
+    def __init__(self, view_layer, warnings: Warnings):
+        self.view_layer = view_layer
+        self.warnings = warnings
+        self.found = Collected()
+        self.known: dict[tuple, int | None] = {}
+
+    def visit(self, instance) -> None:
+        item = instance.object
+        if item.type == "LIGHT":
+            visibility = self.visibility(item, instance.parent if instance.is_instance else item)
+            self.found.lights.append((item.name, item.data, matrix_of(instance), visibility))
+        elif item.type == "MESH":
+            self.visit_mesh(instance, item)
+        elif item.type in UNSUPPORTED:
+            self.warnings.add(f"{UNSUPPORTED[item.type]} are not supported yet; left out", item.name)
+
+    def visit_mesh(self, instance, item) -> None:
+        is_instance = instance.is_instance
+        # Duplicated objects are temporaries that Blender reuses; the object they were made from lasts.
+        lasting = instance.instance_object if is_instance else item
+        parent = instance.parent if is_instance else item
+        mesh = item.data
+        key = (mesh.as_pointer(), lasting.as_pointer() if lasting else 0, parent.as_pointer())
+        if key not in self.known:
+            self.known[key] = self.add_prototype(item, lasting or parent, parent, mesh)
+        index = self.known[key]
+        if index is None:
+            return
+        random = (instance.random_id & MASK) / MASK if is_instance else self.found.prototypes[index].random
+        self.found.placed.append((index, matrix_of(instance), random))
+
+    def add_prototype(self, item, lasting, parent, mesh) -> int | None:
+        """None for what no ray sees."""
+        visibility = self.visibility(item, parent)
+        if not visibility:
+            return None
+        for modifier in getattr(parent, "particle_systems", ()):
+            if modifier.settings.type == "HAIR" and modifier.settings.render_type == "PATH":
+                self.warnings.add("particle hair is not supported yet; left out", parent.name)
+        override = self.view_layer.material_override
+        slots = [override if override else slot.material for slot in item.material_slots] or [override]
+        self.found.prototypes.append(
+            Prototype(
+                name=item.name,
+                mesh=mesh,
+                materials=slots,
+                visibility=visibility,
+                color=tuple(item.color),
+                object_index=item.pass_index,
+                random=random_of_name(item.name),
+                holdout=parent.holdout_get(view_layer=self.view_layer),
+                shadow_terminator_offset=item.shadow_terminator_shading_offset,
+                object=lasting,
+                parent=parent,
+                is_plain=lasting == parent and item.type == lasting.type and not lasting.modifiers,
+            )
+        )
+        return len(self.found.prototypes) - 1
+
+    def visibility(self, item, parent) -> int:
+        seen = ray_visibility(item)
+        if parent != item:
+            seen &= ray_visibility(parent)
+        holdout = parent.holdout_get(view_layer=self.view_layer)
+        if not holdout and parent.indirect_only_get(view_layer=self.view_layer):
+            seen &= ~CAMERA
+        return seen
+
+
+def ray_visibility(item) -> int:
+    return sum(bit for name, bit in VISIBILITY.items() if getattr(item, name)) & VISIBLE_TO_ALL
+
+
+def matrix_of(instance):
+    # Matrices are buffers from 5.0 on; before that, flattening in C is the fastest way to read one.
+    if MATRICES_ARE_BUFFERS:
+        return np.array(instance.matrix_world, np.float32)
+    return list(chain.from_iterable(instance.matrix_world))
+
+
+def stack_matrices(matrices: list) -> np.ndarray:
+    """(n, 4, 4) float32."""
+    return np.array(matrices, np.float32).reshape(-1, 4, 4)
+
+
+def usable(matrices: np.ndarray) -> np.ndarray:
+    """Which matrices leave a surface: all finite, and at most one axis flattened."""
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    axes = np.where(finite[:, None, None], matrices[:, :3, :3], 0)
+    # The largest cross product of two axes is the largest area that a unit square can keep.
+    pairs = [np.cross(axes[:, :, i], axes[:, :, j]) for i, j in ((0, 1), (1, 2), (2, 0))]
+    return finite & (np.abs(np.stack(pairs)).max(axis=(0, 2)) > 0)
+
+
+def place(
+    found: Collected, meshes: list[int | None], slots: list[list[int]], attributes: list[dict], warnings: Warnings
+) -> list[Instance]:
+    """Instances of all prototypes that have a mesh; the three lists go by prototype."""
+    if not found.placed:
+        return []
+    matrices = stack_matrices([entry[1] for entry in found.placed])
+    instances = []
+    for (index, _, random), matrix, good in zip(found.placed, matrices, usable(matrices).tolist(), strict=True):
+        prototype, mesh = found.prototypes[index], meshes[index]
+        if mesh is None:
+            continue
+        if not good:
+            warnings.add("its matrix is singular or not finite; left out", prototype.name)
+            continue
+        instances.append(
+            Instance(
+                name=prototype.name,
+                mesh=mesh,
+                matrix=matrix,
+                materials=slots[index],
+                visibility=prototype.visibility,
+                color=prototype.color,
+                object_index=prototype.object_index,
+                random=random,
+                holdout=prototype.holdout,
+                shadow_terminator_offset=prototype.shadow_terminator_offset,
+                attributes=attributes[index],
+            )
+        )
+    return instances

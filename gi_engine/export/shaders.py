@@ -1,0 +1,45 @@
+"""Materials, lamps and the world to programs, each compiled once; and what those programs ask of objects."""
+
+from __future__ import annotations
+
+from ..scene_data import Scene
+from .mesh import UNDEFORMED
+from .warnings import Warnings
+
+
+class Shaders:
+    """Hands out indices into scene.programs."""
+
+    def __init__(self, scene: Scene, depsgraph, warnings: Warnings):
+        from ..nodes.compile import Compiler
+
+        self.scene = scene
+        self.compiler = Compiler(scene, depsgraph, warnings.add)
+        self.index_of: dict[int, int] = {}
+
+    def slots(self, materials: list) -> list[int]:
+        """Programs of an object's material slots; empty ones get the default material."""
+        return [self.material(material) for material in materials]
+
+    def material(self, material) -> int:
+        return self.once(material, self.compiler.material)
+
+    def light(self, light) -> int:
+        """-1 where the lamp has no nodes of its own."""
+        return self.once(light, self.compiler.light) if light.use_nodes and light.node_tree else -1
+
+    def world(self, world) -> int:
+        return self.once(world, self.compiler.world)
+
+    def once(self, owner, compile_program) -> int:
+        key = owner.as_pointer() if owner else 0
+        if key not in self.index_of:
+            self.index_of[key] = len(self.scene.programs)
+            self.scene.programs.append(compile_program(owner))
+        return self.index_of[key]
+
+    def wanted_attributes(self) -> set[str]:
+        return set(self.scene.attribute_names)
+
+    def object_attributes(self, prototype) -> dict[str, tuple]:
+        return {}

@@ -1,0 +1,52 @@
+"""The render passes: how Blender asks for each and what it is called there, by version."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+NAMES_CHANGED = bpy.app.version >= (5, 0, 0)
+
+
+@dataclass(frozen=True)
+class Pass:
+    name: str  # the contract's: Blender's from 5.0 on
+    old_name: str  # Blender's before that
+    channels: str
+    kind: str  # COLOR, VALUE or VECTOR
+    wanted: str  # the view layer's property, "" for always
+
+    @property
+    def blender_name(self) -> str:
+        return self.name if NAMES_CHANGED else self.old_name
+
+
+PASSES = (
+    Pass("Combined", "Combined", "RGBA", "COLOR", ""),
+    Pass("Depth", "Depth", "Z", "VALUE", "use_pass_z"),
+    Pass("Normal", "Normal", "XYZ", "VECTOR", "use_pass_normal"),
+    Pass("Position", "Position", "XYZ", "VECTOR", "use_pass_position"),
+    Pass("UV", "UV", "UVA", "VECTOR", "use_pass_uv"),
+    Pass("Object Index", "IndexOB", "X", "VALUE", "use_pass_object_index"),
+    Pass("Material Index", "IndexMA", "X", "VALUE", "use_pass_material_index"),
+    Pass("Emission", "Emit", "RGB", "COLOR", "use_pass_emit"),
+    Pass("Environment", "Env", "RGB", "COLOR", "use_pass_environment"),
+    Pass("Albedo", "Albedo", "RGB", "COLOR", "gi_engine.use_pass_albedo"),
+    Pass("Sample Count", "Sample Count", "X", "VALUE", "gi_engine.use_pass_sample_count"),
+)
+
+
+def passes_of(view_layer) -> list[Pass]:
+    """The passes that the view layer asks for."""
+    return [p for p in PASSES if not p.wanted or flag(view_layer, p.wanted)]
+
+
+def flag(owner, path: str) -> bool:
+    for name in path.split("."):
+        owner = getattr(owner, name, False)
+    return bool(owner)
+
+
+def contract_name(blender_name: str) -> str | None:
+    return next((p.name for p in PASSES if p.blender_name == blender_name), None)

@@ -1,0 +1,131 @@
+"""Settings that live in .blend files. The integrators' own are generated from their descriptors.
+
+A scene follows its Cycles settings until one of ours is set (or copied): from then on all of them are its own.
+"""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
+
+from . import native
+from .export.settings import SHARED
+
+FILTERS = (
+    ("BOX", "Box", "Equal weight over the filter's width"),
+    ("GAUSSIAN", "Gaussian", "Bell curve"),
+    ("BLACKMAN_HARRIS", "Blackman-Harris", "Bell curve that ends smoothly"),
+)
+
+
+def take_over(name: str):
+    """Called when a shared setting is set: the others are copied from Cycles, once, and the scene has its own."""
+
+    def update(settings, context):
+        if settings.is_own:
+            return
+        settings.is_own = True
+        cycles = getattr(settings.id_data, "cycles", None)
+        for other, theirs in SHARED.items():
+            if other != name and hasattr(settings, other) and hasattr(cycles, theirs):
+                setattr(settings, other, getattr(cycles, theirs))
+
+    return update
+
+
+def fixed_properties() -> dict:
+    """Those that do not depend on the integrators."""
+    return {
+        "is_own": BoolProperty(name="Own Settings", description="Off: samples, bounces, film and so on are Cycles'"),
+        "samples": IntProperty(name="Samples", description="Samples of each pixel", default=128, min=1, max=1 << 24),
+        "time_limit": FloatProperty(name="Time Limit", description="Seconds of sampling; 0 for no limit", min=0, unit="TIME_ABSOLUTE"),
+        "noise_target": FloatProperty(
+            name="Noise Target",
+            description="Stops when 95 % of the pixels have a relative standard error below this; 0 for no target",
+            min=0,
+            soft_max=0.5,
+            precision=4,
+        ),
+        "seed": IntProperty(name="Seed", description="Another seed gives another pattern of noise", min=0),
+        "use_animated_seed": BoolProperty(name="Animate Seed", description="Another seed for each frame"),
+        "film_exposure": FloatProperty(name="Exposure", description="Image brightness scale", default=1, min=0, soft_max=10),
+        "transparent_glass": BoolProperty(name="Transparent Glass", description="Glass shows what is behind the scene as transparent"),
+        "transparent_roughness": FloatProperty(
+            name="Roughness Threshold", description="Rougher transmission than this stays opaque", default=0.1, min=0, max=1
+        ),
+        "pixel_filter": EnumProperty(name="Pixel Filter", items=FILTERS, default="BLACKMAN_HARRIS"),
+        "filter_width": FloatProperty(
+            name="Filter Width", description="Width of the pixel filter", default=1.5, min=0.01, max=10, subtype="PIXEL"
+        ),
+    }
+
+
+def property_of(parameter: dict):
+    """A bpy property for one parameter of a descriptor."""
+    options = {"name": parameter["label"], "description": parameter.get("help", ""), "default": parameter["default"]}
+    kind = parameter["type"]
+    if kind == "bool":
+        return BoolProperty(**options)
+    if kind == "enum":
+        return EnumProperty(items=[enum_item(item) for item in parameter["items"]], **options)
+    limits = {side: parameter[side] for side in ("min", "max") if parameter.get(side) is not None}
+    return (IntProperty if kind == "int" else FloatProperty)(**options, **limits)
+
+
+def enum_item(item) -> tuple[str, str, str]:
+    """Descriptors give (id, label, help), or as little as the id."""
+    if isinstance(item, str):
+        return (item, item.replace("_", " ").title(), "")
+    identifier, label, text = (*item, "", "")[:3]
+    return (identifier, label or identifier, text)
+
+
+def shared_parameters(descriptors: list[dict]) -> dict[str, dict]:
+    """Parameters that Cycles has too: set once for all integrators."""
+    return {p["name"]: p for d in descriptors for p in d["parameters"] if p["name"] in SHARED}
+
+
+def integrator_group(descriptor: dict) -> type:
+    """The PropertyGroup of one integrator's own parameters."""
+    own = {p["name"]: property_of(p) for p in descriptor["parameters"] if p["name"] not in SHARED}
+    return type(f"GI_PG_{descriptor['id']}", (bpy.types.PropertyGroup,), {"__annotations__": own})
+
+
+def settings_group(descriptors: list[dict], groups: dict[str, type]) -> type:
+    items = [(d["id"], d["label"], d.get("blurb", "")) for d in descriptors] or [("path", "Path tracing", "")]
+    default = next((item[0] for item in items if item[0] == "path"), items[0][0])
+    annotations = fixed_properties()
+    annotations["integrator"] = EnumProperty(name="Integrator", items=items, default=default, description="How light is followed")
+    for name, parameter in shared_parameters(descriptors).items():
+        annotations[name] = property_of(parameter)
+    for name in annotations.keys() & SHARED.keys():
+        annotations[name].keywords["update"] = take_over(name)
+    for identifier, group in groups.items():
+        annotations[identifier] = PointerProperty(type=group)
+    return type("GI_PG_scene", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
+
+
+class GI_PG_view_layer(bpy.types.PropertyGroup):
+    use_pass_albedo: BoolProperty(name="Albedo", description="Share of light that the surface reflects or transmits")
+    use_pass_sample_count: BoolProperty(name="Sample Count", description="Samples that each pixel got")
+
+
+_registered: list[type] = []
+
+
+def register() -> None:
+    descriptors = native.integrators()
+    groups = {d["id"]: integrator_group(d) for d in descriptors}
+    scene_group = settings_group(descriptors, groups)
+    for cls in (*groups.values(), scene_group, GI_PG_view_layer):
+        bpy.utils.register_class(cls)
+        _registered.append(cls)
+    bpy.types.Scene.gi_engine = PointerProperty(type=scene_group)
+    bpy.types.ViewLayer.gi_engine = PointerProperty(type=GI_PG_view_layer)
+
+
+def unregister() -> None:
+    del bpy.types.ViewLayer.gi_engine
+    del bpy.types.Scene.gi_engine
+    while _registered:
+        bpy.utils.unregister_class(_registered.pop())

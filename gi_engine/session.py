@@ -1,0 +1,49 @@
+"""One render of one view layer by the native engine: build, start, poll, read, stop. No bpy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import native
+from .scene_data import Scene, Settings
+
+POLL_SECONDS = 0.05  # how soon a cancel is seen
+UPDATE_SECONDS = 0.25  # how often the image is shown
+
+
+class RenderFailed(RuntimeError):
+    """The native engine gave up; the message is for the user."""
+
+
+class Session:
+    """Owns the native scene and session. Use as a context manager: leaving it stops the threads."""
+
+    def __init__(self, scene: Scene, settings: Settings):
+        gi = native.module()
+        self.native_scene = gi.Scene(scene)
+        self.native = gi.Session(self.native_scene, settings)
+
+    def __enter__(self) -> Session:
+        self.native.start()
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.native.cancel()
+
+    def wait(self) -> bool:
+        """Waits a moment, without the GIL; True when the render is done. Raises RenderFailed."""
+        done = self.native.wait(POLL_SECONDS)
+        if done and (error := self.progress().get("error")):
+            raise RenderFailed(error)
+        return done
+
+    def progress(self) -> dict:
+        return self.native.progress()
+
+    def read(self, name: str) -> np.ndarray:
+        """The pass as it is now: (height, width, channels) float32 of the rendered region, row 0 at the bottom."""
+        return self.native.read(name)
+
+    def warnings(self) -> list[str]:
+        """What the native side found wrong with the scene."""
+        return list(getattr(self.native_scene, "warnings", ()))

@@ -1,0 +1,15 @@
+"""Panels and operators: our own, and Blender's that we join."""
+
+from . import compat, object_panels, operators, render_panels
+
+PARTS = (operators, render_panels, object_panels, compat)
+
+
+def register() -> None:
+    for part in PARTS:
+        part.register()
+
+
+def unregister() -> None:
+    for part in reversed(PARTS):
+        part.unregister()

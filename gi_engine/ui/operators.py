@@ -1,0 +1,42 @@
+"""Buttons."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..export.settings import copy_from_cycles
+
+
+class GI_OT_copy_from_cycles(bpy.types.Operator):
+    """Give the scene its own copy of Cycles' samples, bounces, clamping, caustics, film, pixel filter and seed"""
+
+    bl_idname = "gi_engine.copy_from_cycles"
+    bl_label = "Copy from Cycles"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if hasattr(context.scene, "cycles"):
+            return True
+        cls.poll_message_set("The Cycles add-on is switched off")
+        return False
+
+    def execute(self, context):
+        copy_from_cycles(context.scene)
+        return {"FINISHED"}
+
+
+class GI_OT_follow_cycles(bpy.types.Operator):
+    """Forget the scene's own settings: take Cycles' samples, bounces, film and so on, whatever they are"""
+
+    bl_idname = "gi_engine.follow_cycles"
+    bl_label = "Follow Cycles"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        context.scene.gi_engine.is_own = False
+        return {"FINISHED"}
+
+
+CLASSES = (GI_OT_copy_from_cycles, GI_OT_follow_cycles)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)
