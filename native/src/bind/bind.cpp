@@ -1,0 +1,19 @@
+// The extension module gi_engine_native._core.
+#include "bind/bind.h"
+
+#include "core/check.h"
+
+namespace nb = nanobind;
+
+NB_MODULE(_core, m) {
+  nb::register_exception_translator([](const std::exception_ptr& p, void*) {
+    try {
+      std::rethrow_exception(p);
+    } catch (const gi::InputError& e) {
+      PyErr_SetString(PyExc_ValueError, e.what());
+    } catch (const gi::DeviceError& e) {
+      PyErr_SetString(PyExc_RuntimeError, e.what());
+    }
+  });
+  gi::bind::bind_render(m);
+}

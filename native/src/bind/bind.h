@@ -1,0 +1,16 @@
+// The parts of the extension module, one function for each family.
+#pragma once
+#include <nanobind/nanobind.h>
+
+#include <memory>
+
+#include "shading/resources.h"
+
+namespace gi::bind {
+
+void bind_render(nanobind::module_& m);
+
+// The images of a scene_data.Scene.
+std::unique_ptr<ShaderResources> read_resources(nanobind::handle scene);
+
+}  // namespace gi::bind

@@ -1,0 +1,134 @@
+// Scene, Session and the integrators' descriptors, for Python. The GIL is released while native code works or waits.
+#include "bind/bind.h"
+
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "bind/read_scene.h"
+#include "core/check.h"
+
+namespace nb = nanobind;
+
+namespace gi::bind {
+namespace {
+
+// A scene with the camera and film that came with it.
+struct BoundScene {
+  std::unique_ptr<Scene> scene;
+  std::vector<std::string> warnings;
+};
+
+BoundScene* make_scene(nb::handle data, const std::string& embree, int threads) {
+  auto bound = std::make_unique<BoundScene>();
+  SceneData native = read_scene(data);
+  std::unique_ptr<ShaderResources> resources = read_resources(data);
+  const nb::gil_scoped_release release;
+  validate(native, bound->warnings);
+  bound->scene = std::make_unique<Scene>(std::move(native), std::move(resources), embree, threads);
+  return bound.release();
+}
+
+nb::dict progress_dict(const Session& session) {
+  Progress p;
+  {
+    const nb::gil_scoped_release release;
+    p = session.progress();
+  }
+  nb::dict d;
+  d["passes"] = p.passes;
+  d["samples_per_pixel"] = p.passes;
+  d["fraction"] = p.fraction;
+  d["seconds"] = p.seconds;
+  d["remaining"] = p.remaining;
+  d["rays"] = p.rays;
+  d["noise"] = p.noise;
+  d["bad_samples"] = p.bad_samples;
+  d["memory"] = p.memory;
+  d["done"] = p.done;
+  d["cancelled"] = p.cancelled;
+  d["error"] = p.error;
+  return d;
+}
+
+nb::ndarray<nb::numpy, float> read_pass(const Session& session, const std::string& pass) {
+  const FilmSpec& spec = session.film().spec();
+  const int channels = Film::channels(pass);
+  require(channels > 0, "there is no pass named '" + pass + "'");
+  const size_t h = size_t(spec.region_height()), w = size_t(spec.region_width()), c = size_t(channels);
+  auto* pixels = new std::vector<float>(h * w * c);
+  nb::capsule owner(pixels, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+  {
+    const nb::gil_scoped_release release;
+    session.film().read(pass, pixels->data());
+  }
+  return nb::ndarray<nb::numpy, float>(pixels->data(), {h, w, c}, owner);
+}
+
+nb::list describe_integrators() {
+  nb::list all;
+  for (const Descriptor& d : integrators()) {
+    nb::list parameters;
+    for (const Parameter& p : d.parameters) {
+      static const char* const kKinds[] = {"INT", "FLOAT", "BOOL", "ENUM"};
+      nb::dict q;
+      q["name"] = p.name, q["label"] = p.label, q["type"] = kKinds[int(p.kind)];
+      q["min"] = p.min, q["max"] = p.max, q["help"] = p.help, q["unit"] = p.unit;
+      nb::list items;
+      for (const Parameter::Item& item : p.items) items.append(nb::make_tuple(item.id, item.label, item.help));
+      q["items"] = items;
+      switch (p.kind) {
+        case Parameter::Kind::kInt: q["default"] = int(p.value); break;
+        case Parameter::Kind::kFloat: q["default"] = p.value; break;
+        case Parameter::Kind::kBool: q["default"] = p.value != 0; break;
+        case Parameter::Kind::kChoice: q["default"] = p.items[size_t(p.value)].id; break;
+      }
+      parameters.append(q);
+    }
+    nb::dict entry;
+    entry["id"] = d.id, entry["label"] = d.label, entry["blurb"] = d.blurb, entry["parameters"] = parameters;
+    all.append(entry);
+  }
+  return all;
+}
+
+}  // namespace
+
+void bind_render(nb::module_& m) {
+  nb::class_<BoundScene>(m, "Scene", "A scene ready to be traced, made of a scene_data.Scene.")
+      .def("__init__", [](BoundScene* self, nb::handle data, const std::string& embree, int threads) {
+             std::unique_ptr<BoundScene> made(make_scene(data, embree, threads));
+             new (self) BoundScene(std::move(*made));
+           }, nb::arg("data"), nb::arg("embree"), nb::arg("threads") = 0,
+           "`embree`: path of the Embree library. Raises ValueError naming the object or material for bad input, RuntimeError\n"
+           "where Embree or the machine fails, MemoryError.")
+      .def_prop_ro("warnings", [](const BoundScene& s) { return s.warnings; })
+      .def_prop_ro("embree", [](const BoundScene& s) { return s.scene->embree_description(); }, "The library in use and its version.")
+      .def_prop_ro("memory", [](const BoundScene& s) { return s.scene->memory_bytes(); }, "Bytes.")
+      .def("trace", [](const BoundScene& s, nb::ndarray<const float, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu> rays) {
+             const size_t n = rays.shape(0);
+             auto* t = new std::vector<float>(n);
+             for (size_t i = 0; i < n; ++i) {
+               const float* r = rays.data() + 6 * i;
+               const auto hit = s.scene->intersect({{r[0], r[1], r[2]}, {r[3], r[4], r[5]}}, ~0u);
+               (*t)[i] = hit ? hit->t : kInf;
+             }
+             nb::capsule owner(t, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+             return nb::ndarray<nb::numpy, float>(t->data(), {n}, owner);
+           }, nb::arg("rays"), "Distances (n,) along rays (n, 6: origin, unit direction); infinite where nothing is hit.");
+
+  nb::class_<Session>(m, "Session", "One render in the background.")
+      .def("__init__", [](Session* self, const BoundScene& scene, nb::handle camera, nb::handle film, nb::handle settings) {
+             new (self) Session(*scene.scene, read_camera(camera), read_film(film), read_settings(settings));
+           }, nb::arg("scene"), nb::arg("camera"), nb::arg("film"), nb::arg("settings"), nb::keep_alive<1, 2>(),
+           "Takes scene_data's Camera, Film and Settings. Raises ValueError for bad input.")
+      .def("start", &Session::start)
+      .def("wait", &Session::wait, nb::arg("seconds"), nb::call_guard<nb::gil_scoped_release>(), "True once the render has ended.")
+      .def("cancel", &Session::cancel)
+      .def("progress", &progress_dict)
+      .def("read", &read_pass, nb::arg("render_pass"), "The pass so far: (height, width, channels) float32, row 0 at the bottom.");
+
+  m.def("integrators", &describe_integrators, "Descriptors of the integrators and their parameters.");
+}
+
+}  // namespace gi::bind
