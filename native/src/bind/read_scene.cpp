@@ -14,7 +14,7 @@ namespace {
 
 // One dataclass instance, and what to call it in messages.
 struct Record {
-  nb::handle object;
+  nb::object object;
   std::string who;
 
   nb::object at(const char* field) const {
@@ -84,7 +84,6 @@ struct Record {
     for (nb::handle item : items) {
       std::string name = nb::hasattr(item, "name") ? nb::cast<std::string>(nb::str(item.attr("name"))) : "?";
       records.push_back({nb::borrow(item), kind + " '" + name + "'"});
-      kept.push_back(nb::borrow(item));
     }
     return records;
   }
@@ -94,7 +93,6 @@ struct Record {
   static std::string type_name() {
     return std::is_same_v<std::remove_const_t<T>, float> ? "float32" : "int32";
   }
-  mutable std::vector<nb::object> kept;
 };
 
 // Embree reads 4 bytes past the last vertex: arrays that do not have them are copied.
@@ -204,15 +202,14 @@ MaterialData read_program(const Record& r) {
 }  // namespace
 
 SceneData read_scene(nb::handle scene) {
-  const Record r{scene, "the scene"};
+  const Record r{nb::borrow(scene), "the scene"};
   SceneData d;
   for (const Record& m : r.list("meshes", "mesh")) d.meshes.push_back(read_mesh(m));
   for (const Record& i : r.list("instances", "object")) d.instances.push_back(read_instance(i));
   for (const Record& l : r.list("lights", "light")) d.lamps.push_back(read_lamp(l));
   for (const Record& p : r.list("programs", "material")) d.materials.push_back(read_program(p));
   d.attribute_names = r.get<std::vector<std::string>>("attribute_names");
-  const nb::object world_object = r.at("world");
-  const Record world{world_object, "the world"};
+  const Record world{r.at("world"), "the world"};
   d.world.program = world.get<int>("program");
   d.world.visibility = world.get<uint32_t>("visibility");
   const auto sampling = world.get<std::string>("sampling");
@@ -223,7 +220,7 @@ SceneData read_scene(nb::handle scene) {
 }
 
 Camera read_camera(nb::handle camera) {
-  const Record r{camera, "the camera"};
+  const Record r{nb::borrow(camera), "the camera"};
   Camera c;
   c.name = r.get<std::string>("name");
   c.kind = r.choice<Camera::Kind>("kind", {{"PERSP", Camera::Kind::kPerspective}, {"ORTHO", Camera::Kind::kOrthographic}, {"PANO", Camera::Kind::kPanoramic}});
@@ -243,7 +240,7 @@ Camera read_camera(nb::handle camera) {
 }
 
 FilmSpec read_film(nb::handle film) {
-  const Record r{film, "the film"};
+  const Record r{nb::borrow(film), "the film"};
   FilmSpec f;
   f.width = r.get<int>("width"), f.height = r.get<int>("height");
   nb::object region = r.at("region");
@@ -263,7 +260,7 @@ FilmSpec read_film(nb::handle film) {
 }
 
 RenderSettings read_settings(nb::handle settings) {
-  const Record r{settings, "the settings"};
+  const Record r{nb::borrow(settings), "the settings"};
   RenderSettings s;
   s.integrator = r.get<std::string>("integrator");
   s.samples = r.get<int>("samples");
