@@ -16,4 +16,5 @@ NB_MODULE(_core, m) {
     }
   });
   gi::bind::bind_render(m);
+  gi::bind::bind_lobes(m);
 }

@@ -2,44 +2,55 @@
 // Integrators see only this; lobes live one to a header under lobes/ and know only their own local frame.
 #pragma once
 #include <optional>
+#include <type_traits>
 
 #include "core/vec.h"
 #include "shading/lobes/lobes.h"
 
 namespace gi {
 
-// Value and density of a BSDF (or lobe) for a pair of directions. `value` contains |cos θi|. `pdf_dir` per steradian.
+// A direction drawn from a BSDF. `value` contains |cos θi|. `pdf_dir` per steradian.
 struct BsdfSample {
   Vec3 wi;           // world space, unit, away from the surface
   Rgb value;         // f(wo, wi) |cos θi| of the whole mix; for delta lobes the factor itself
   float pdf_dir = 0; // of the whole mix, lobe choice included; for delta lobes the probability of the choice
-  uint8_t flags = 0; // LobeFlags of the lobe that was sampled
+  uint8_t flags = 0; // of the lobe that was sampled: side and kind; kTransparent alone for straight through
   float roughness = 0;  // of the sampled lobe, for the footprint and for caustic filtering
+  bool is_delta() const { return flags & (kSpecular | kTransparent); }
 };
 
+// Reuse one object: 24 lobes are some kilobytes, and clear() touches none of them.
 class Bsdf {
  public:
   static constexpr int kMaxLobes = 24;
 
-  // `without`: CausticFlags, lobes to leave out.
+  Bsdf() {}  // entries_ stay uninitialised
+  // `without`: CausticFlags, sides of glossy lobes to leave out.
   void clear(Vec3 ng, Vec3 ns, uint8_t without = 0) {
-    count_ = 0, ng_ = ng, ns_ = ns, without_ = without, emission = Rgb(), transparency = Rgb(), holdout = Rgb();
+    count_ = 0, flags_ = 0, ng_ = ng, ns_ = ns, without_ = without, emission = Rgb(), transparency = Rgb(), holdout = Rgb();
   }
+  uint8_t without() const { return without_; }
   void set_geometric_normal(Vec3 ng) { ng_ = ng; }
+  // The object's shadow terminator offset, as a frequency: 1 / (1 − offset / 2). Survives clear().
+  void set_terminator_frequency(float f) { terminator_ = f; }
 
-  // Adds `lobe` in the frame whose z is the lobe's own (bumped) normal. Zero, negative or NaN weights are dropped.
+  // Adds `lobe` in the frame whose z is the lobe's own (bumped) normal. Negative components count as 0; weights that come to
+  // nothing are dropped, and so are lobes beyond kMaxLobes.
   void add(Rgb weight, const Lobe& lobe, const Frame& frame);
   // Called once after the last add: selection probabilities from the lobes' albedos towards `wo`.
   void finish(Vec3 wo);
 
-  LobeEval eval(Vec3 wo, Vec3 wi) const;                                   // delta lobes contribute nothing
-  // As eval, but only lobes with one of `flags`: what passes and Light Path logic need.
+  LobeEval eval(Vec3 wo, Vec3 wi) const;  // delta lobes contribute nothing
+  // As eval, but the value is only of lobes whose side and kind for this pair (say kReflection and kDiffuse) are both in
+  // `flags`; the density stays that of the whole mix. For passes and Light Path logic.
   LobeEval eval(Vec3 wo, Vec3 wi, uint8_t flags) const;
+  // A direction on the wrong side of the geometric normal for its lobe ends the path: no sample.
   std::optional<BsdfSample> sample(Vec3 wo, Vec2 u, float u_lobe) const;
   float delta_probability() const;  // with which `sample` picks a delta lobe, transparency included
   // Picks among the delta lobes alone; pdf_dir is the probability within `sample` (not given that it is a delta lobe).
   std::optional<BsdfSample> sample_delta(Vec3 wo, float u_lobe) const;
   Rgb albedo(Vec3 wo) const;        // directional albedo, transparency left out
+  Rgb albedo(Vec3 wo, uint8_t flags) const;  // only of lobes with a kind (kDiffuse, kGlossy, kSpecular) in `flags`
   Rgb diffuse_albedo() const;       // Σ weights of the diffuse lobes
   Vec3 mean_normal() const;         // albedo-weighted shading normal (Normal pass, denoising)
   uint8_t flags() const { return flags_; }
@@ -54,14 +65,27 @@ class Bsdf {
  private:
   struct Entry {
     Lobe lobe;
-    Rgb weight;
     Frame frame;
+    Rgb weight;
     float select = 0;  // probability
+    uint8_t flags = 0;
+    bool bumped = false;  // its normal is not ns_
   };
-  Entry entries_[kMaxLobes];
+  static_assert(std::is_trivially_copyable_v<Entry>);
+  const Entry* begin() const { return entries_; }
+  const Entry* end() const { return entries_ + count_; }
+  float shadowing(const Entry& e, Vec3 wi, float cos_i, bool sampled) const;
+  template <class Accept>
+  LobeEval eval_if(Vec3 wo, Vec3 wi, const Entry* skipped, Accept accept) const;
+  std::optional<BsdfSample> sample_entry(const Entry& e, Vec3 wo, Vec2 u, float u_lobe) const;
+
+  union {
+    Entry entries_[kMaxLobes];
+  };
   int count_ = 0;
   uint8_t flags_ = 0, without_ = 0;
   float select_transparent_ = 0;
+  float terminator_ = 1;
   Vec3 ng_{0, 0, 1}, ns_{0, 0, 1};  // both face wo
 };
 

@@ -1,5 +1,5 @@
 // What every lobe answers. Directions are unit, in the lobe's frame (z is its normal), away from the surface;
-// wo.z > 0 always (the frame faces the viewer); wi.z < 0 is transmission.
+// wi.z < 0 is transmission. wo.z is positive but where a bumped normal turns from the viewer: glossy lobes are black there.
 //
 //   struct SomeLobe {
 //     uint8_t flags() const;                                            // LobeFlags

@@ -2,10 +2,12 @@
 #pragma once
 #include <variant>
 
+#include "shading/lobes/ashikhmin_shirley.h"
 #include "shading/lobes/lambert.h"
+#include "shading/lobes/microfacet.h"
 
 namespace gi {
 
-using Lobe = std::variant<Lambert>;
+using Lobe = std::variant<Lambert, GgxLobe, BeckmannLobe, AshikhminShirley>;
 
 }  // namespace gi

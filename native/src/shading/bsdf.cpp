@@ -1,0 +1,177 @@
+// Mixes lobes: one-sample model over all of them with densities summed [Veach 1997, §9.2.4]; what bumped normals need
+// (shading_normal.h) is applied here, once, for every lobe.
+#include "shading/bsdf.h"
+
+#include <memory>
+
+#include "shading/shading_normal.h"
+#include "shading/shading_point.h"
+
+namespace gi {
+namespace {
+
+constexpr float kLeastWeight = 1e-5f;  // Blender's own cut-off
+constexpr uint8_t kKinds = kDiffuse | kGlossy | kSpecular;
+
+uint8_t flags_of(const Lobe& lobe) {
+  return std::visit([](const auto& l) { return l.flags(); }, lobe);
+}
+LobeEval eval_of(const Lobe& lobe, Vec3 wo, Vec3 wi) {
+  return std::visit([&](const auto& l) { return l.eval(wo, wi); }, lobe);
+}
+Rgb albedo_of(const Lobe& lobe, Vec3 wo) {
+  return std::visit([&](const auto& l) { return l.albedo(wo); }, lobe);
+}
+std::optional<LobeSample> sample_of(const Lobe& lobe, Vec3 wo, Vec2 u, float u_lobe) {
+  return std::visit([&](const auto& l) { return l.sample(wo, u, u_lobe); }, lobe);
+}
+
+// The sides of a lobe that caustics switches take away: glossy ones only, diffuse light makes no caustics.
+uint8_t sides_without(uint8_t flags, uint8_t without) {
+  if (flags & kDiffuse) return 0;
+  return flags & ((without & kNoReflectiveCaustics ? kReflection : 0) | (without & kNoRefractiveCaustics ? kTransmission : 0));
+}
+void remove_side(Lobe& lobe, uint8_t side) {
+  std::visit([side](auto& l) {
+    if constexpr (requires { l.remove(side); }) l.remove(side);
+  }, lobe);
+}
+
+}  // namespace
+
+void Bsdf::add(Rgb weight, const Lobe& lobe, const Frame& frame) {
+  const Rgb w{std::max(weight.r, 0.0f), std::max(weight.g, 0.0f), std::max(weight.b, 0.0f)};
+  if (!(average(w) >= kLeastWeight) || !is_finite(w) || count_ == kMaxLobes) return;
+  const uint8_t flags = flags_of(lobe), removed = sides_without(flags, without_), left = flags & ~removed;
+  if (!(left & (kReflection | kTransmission))) return;
+  Entry& e = *std::construct_at(&entries_[count_++], Entry{lobe, frame, w, 0.0f, left, !(frame.z == ns_)});
+  if (removed) remove_side(e.lobe, removed);
+  flags_ |= left;
+}
+
+void Bsdf::finish(Vec3 wo) {
+  float sum = std::max(average(transparency), 0.0f);
+  const bool single = count_ == 1 && sum == 0.0f;
+  select_transparent_ = sum;
+  for (int i = 0; i < count_; ++i) {
+    Entry& e = entries_[i];
+    e.select = single ? 1.0f : average(e.weight * albedo_of(e.lobe, e.frame.to_local(wo)));
+    sum += e.select;
+  }
+  if (select_transparent_ > 0.0f) flags_ |= kTransparent;
+  const float scale = sum > 0.0f ? 1.0f / sum : 0.0f;
+  select_transparent_ *= scale;
+  for (int i = 0; i < count_; ++i) entries_[i].select *= scale;
+}
+
+// What a bumped normal takes away. Interpolated normals let light in from beyond the geometric horizon, or terminators would show
+// facets; a bumped normal may not let it in from beyond the interpolated horizon, or surfaces would leak.
+float Bsdf::shadowing(const Entry& e, Vec3 wi, float cos_i, bool sampled) const {
+  float s = 1.0f;
+  if (e.bumped) {
+    const bool diffuse = e.flags & kDiffuse;
+    const float cos_ns_wi = dot(ns_, wi), cos_ns_n = dot(ns_, e.frame.z);
+    if (cos_ns_wi * cos_ns_n * cos_i < 0.0f && (!sampled || diffuse)) return 0.0f;
+    if (diffuse) s = bump_shadowing(cos_ns_wi, cos_ns_n);
+  }
+  return terminator_ > 1.0f ? s * terminator_shift(cos_i, terminator_) : s;
+}
+
+template <class Accept>
+LobeEval Bsdf::eval_if(Vec3 wo, Vec3 wi, const Entry* skipped, Accept accept) const {
+  LobeEval sum;
+  for (const Entry& e : *this) {
+    if (&e == skipped || (e.flags & kSpecular)) continue;
+    const Vec3 wi_local = e.frame.to_local(wi);
+    if (!(e.flags & (wi_local.z < 0.0f ? kTransmission : kReflection))) continue;
+    const float s = shadowing(e, wi, wi_local.z, false);
+    if (s == 0.0f) continue;
+    const LobeEval l = eval_of(e.lobe, e.frame.to_local(wo), wi_local);
+    sum.pdf_dir += e.select * l.pdf_dir;
+    if (accept(e, wi_local.z)) sum.value += e.weight * l.value * s;
+  }
+  return sum;
+}
+
+LobeEval Bsdf::eval(Vec3 wo, Vec3 wi) const {
+  return eval_if(wo, wi, nullptr, [](const Entry&, float) { return true; });
+}
+
+LobeEval Bsdf::eval(Vec3 wo, Vec3 wi, uint8_t flags) const {
+  return eval_if(wo, wi, nullptr, [flags](const Entry& e, float cos_i) {
+    return (flags & e.flags & kKinds) && (flags & (cos_i < 0.0f ? kTransmission : kReflection));
+  });
+}
+
+std::optional<BsdfSample> Bsdf::sample(Vec3 wo, Vec2 u, float u_lobe) const {
+  // Choose a lobe, and keep what is left of the number for the lobe's own choices.
+  float left = u_lobe;
+  for (const Entry& e : *this) {
+    if (left < e.select) return sample_entry(e, wo, u, std::min(left / e.select, kOneMinusEpsilon));
+    left -= e.select;
+  }
+  if (select_transparent_ > 0.0f)
+    return BsdfSample{-wo, transparency, select_transparent_, kTransparent, 0.0f};
+  // Rounding left a little over: it belongs to the last lobe that can be chosen.
+  for (int i = count_ - 1; i >= 0; --i)
+    if (entries_[i].select > 0.0f) return sample_entry(entries_[i], wo, u, kOneMinusEpsilon);
+  return {};
+}
+
+float Bsdf::delta_probability() const {
+  float sum = select_transparent_;
+  for (const Entry& e : *this)
+    if (e.flags & kSpecular) sum += e.select;
+  return sum;
+}
+
+std::optional<BsdfSample> Bsdf::sample_delta(Vec3 wo, float u_lobe) const {
+  float left = u_lobe * delta_probability();
+  for (const Entry& e : *this) {
+    if (!(e.flags & kSpecular)) continue;
+    if (left < e.select) return sample_entry(e, wo, {0.5f, 0.5f}, std::min(left / e.select, kOneMinusEpsilon));
+    left -= e.select;
+  }
+  if (select_transparent_ > 0.0f) return BsdfSample{-wo, transparency, select_transparent_, kTransparent, 0.0f};
+  return {};
+}
+
+std::optional<BsdfSample> Bsdf::sample_entry(const Entry& e, Vec3 wo, Vec2 u, float u_lobe) const {
+  const auto s = sample_of(e.lobe, e.frame.to_local(wo), u, u_lobe);
+  if (!s || !(s->pdf_dir > 0.0f)) return {};
+  const Vec3 wi = normalize(e.frame.to_world(s->wi));
+  const bool transmitted = s->flags & kTransmission;
+  if ((dot(ng_, wi) < 0.0f) != transmitted) return {};
+
+  const float shadow = transmitted ? 1.0f : shadowing(e, wi, s->wi.z, true);
+  BsdfSample result{wi, e.weight * s->value * shadow, e.select * s->pdf_dir, s->flags, s->roughness};
+  if (count_ > 1 && !(s->flags & kSpecular)) {
+    const LobeEval others = eval_if(wo, wi, &e, [](const Entry&, float) { return true; });
+    result.value += others.value, result.pdf_dir += others.pdf_dir;
+  }
+  return result;
+}
+
+Rgb Bsdf::albedo(Vec3 wo) const { return albedo(wo, kKinds); }
+
+Rgb Bsdf::albedo(Vec3 wo, uint8_t flags) const {
+  Rgb sum;
+  for (const Entry& e : *this)
+    if (e.flags & flags & kKinds) sum += e.weight * albedo_of(e.lobe, e.frame.to_local(wo));
+  return sum;
+}
+
+Rgb Bsdf::diffuse_albedo() const {
+  Rgb sum;
+  for (const Entry& e : *this)
+    if (e.flags & kDiffuse) sum += e.weight;
+  return sum;
+}
+
+Vec3 Bsdf::mean_normal() const {
+  Vec3 sum;
+  for (const Entry& e : *this) sum += e.frame.z * e.select;
+  return normalize_or(sum, ns_);
+}
+
+}  // namespace gi
