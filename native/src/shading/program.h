@@ -76,7 +76,12 @@ class Program {
   // Checks every op, register and jump; folds constants. Throws InputError naming `name` (the material).
   Program(std::string name, std::vector<int32_t> code, std::vector<float> constants, int register_count, std::vector<float> tables);
 
+  static constexpr int kMaxRegisters = 4096;
+
   void run(ShadingPoint& point, const ShaderResources& resources, Bsdf* bsdf) const;
+  // Runs without closures and leaves every register in `registers` (register_count floats): for tests and tables.
+  void run_registers(ShadingPoint& point, const ShaderResources& resources, float* registers) const;
+  int register_count() const { return register_count_; }
   // The part of the program that decides transparency (shadow rays), or emission (light sampling).
   const Program& transparency_program() const { return *transparency_; }
   const Program& emission_program() const { return *emission_; }
@@ -89,7 +94,12 @@ class Program {
   bool is_constant() const { return constant_; }
 
  private:
+  void check() const;
   void fold_constants();
+  template <class Wanted>
+  void keep(const Wanted& wanted, const std::vector<float>& values, const std::vector<bool>& known);
+  void summarise();
+  void run_code(float* registers, ShadeState& state) const;
   Program reduced_to(uint8_t effects) const;
 
   std::string name_;
@@ -97,6 +107,7 @@ class Program {
   std::vector<float> constants_;
   int register_count_ = 0;
   std::vector<float> tables_;
+  std::vector<uint8_t> widths_;  // of every op, for the interpreter
   uint8_t effects_ = 0;
   bool constant_ = true;
   std::shared_ptr<Program> transparency_, emission_;

@@ -1,0 +1,219 @@
+// Programs: checking at the border, folding of constants, the interpreter, and the parts that answer one question.
+#include "shading/program.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/check.h"
+#include "shading/resources.h"
+
+namespace gi {
+namespace {
+
+constexpr int kJump = 0;
+
+int width_of(char type) { return type == 'v' ? 3 : 1; }
+
+// Registers and jumps of one instruction, in the order of its operands.
+struct Instruction {
+  const Op& op;
+  const int32_t* operands;  // outputs, inputs, immediates
+  template <class F>
+  void for_outputs(F f) const {
+    for (int i = 0; op.outputs[i]; ++i) f(operands[i], width_of(op.outputs[i]));
+  }
+  template <class F>
+  void for_inputs(F f) const {
+    const int n = int(std::strlen(op.outputs));
+    for (int i = 0; op.inputs[i]; ++i) f(operands[n + i], width_of(op.inputs[i]));
+  }
+};
+
+template <class F>
+void for_each_instruction(const std::vector<int32_t>& code, F f) {
+  for (size_t at = 0; at < code.size();) {
+    const Op& op = ops()[size_t(code[at])];
+    f(at, Instruction{op, code.data() + at + 1});
+    at += size_t(op.width());
+  }
+}
+
+}  // namespace
+
+Program::Program(std::string name, std::vector<int32_t> code, std::vector<float> constants, int register_count, std::vector<float> tables)
+    : name_(std::move(name)), code_(std::move(code)), constants_(std::move(constants)), register_count_(register_count), tables_(std::move(tables)) {
+  check();
+  fold_constants();
+  summarise();
+  if (effects_ & kAddsTransparency) transparency_ = std::make_shared<Program>(reduced_to(kAddsTransparency));
+  if (effects_ & kAddsEmission) emission_ = std::make_shared<Program>(reduced_to(kAddsEmission));
+}
+
+void Program::check() const {
+  const std::string who = "the node program of '" + name_ + "': ";
+  require(register_count_ >= 0 && register_count_ <= kMaxRegisters, who + "needs " + std::to_string(register_count_) + " registers; the most is " + std::to_string(kMaxRegisters));
+  require(int(constants_.size()) <= register_count_, who + "has more constants than registers");
+  std::vector<bool> starts(code_.size() + 1, false);
+  std::vector<size_t> targets;
+  for (size_t at = 0; at < code_.size();) {
+    require(code_[at] >= 0 && size_t(code_[at]) < ops().size(), who + "there is no op " + std::to_string(code_[at]));
+    starts[at] = true;
+    const Op& op = ops()[size_t(code_[at])];
+    const std::string where = who + "op '" + op.name + "' ";
+    require(at + size_t(op.width()) <= code_.size(), where + "is cut off");
+    const Instruction instruction{op, code_.data() + at + 1};
+    const auto in_range = [&](int32_t slot, int width) {
+      require(slot >= 0 && slot + width <= register_count_, where + "uses register " + std::to_string(slot) + " of " + std::to_string(register_count_));
+    };
+    instruction.for_outputs([&](int32_t slot, int width) {
+      in_range(slot, width);
+      require(size_t(slot) >= constants_.size(), where + "writes into a constant");
+    });
+    instruction.for_inputs(in_range);
+    if (code_[at] == kJump) {
+      const int32_t target = code_[at + 2];
+      require(target > int32_t(at) && size_t(target) <= code_.size(), where + "does not jump forwards");
+      targets.push_back(size_t(target));
+    }
+    at += size_t(op.width());
+  }
+  starts[code_.size()] = true;
+  for (const size_t target : targets) require(starts[target], who + "a jump lands inside an instruction");
+}
+
+void Program::run(ShadingPoint& point, const ShaderResources& resources, Bsdf* bsdf) const {
+  float registers[kMaxRegisters];
+  std::copy(constants_.begin(), constants_.end(), registers);
+  ShadeState state{point, resources, tables_.data(), bsdf};
+  run_code(registers, state);
+}
+
+void Program::run_registers(ShadingPoint& point, const ShaderResources& resources, float* registers) const {
+  std::fill_n(registers, register_count_, 0.0f);
+  std::copy(constants_.begin(), constants_.end(), registers);
+  ShadeState state{point, resources, tables_.data(), nullptr};
+  run_code(registers, state);
+}
+
+void Program::run_code(float* registers, ShadeState& state) const {
+  const std::span<const Op> table = ops();
+  const int32_t* code = code_.data();
+  const size_t size = code_.size();
+  for (size_t at = 0; at < size;) {
+    const int32_t op = code[at];
+    if (op == kJump) {
+      at = registers[code[at + 1]] == 0.0f ? size_t(code[at + 2]) : at + 3;
+      continue;
+    }
+    table[size_t(op)].run(Operands{code + at + 1, registers}, state);
+    at += size_t(widths_[size_t(op)]);
+  }
+}
+
+// Pure ops whose inputs are constant are run once, here; what they give joins the constants. A register that is written
+// more than once (in the arms of a jump) is left alone.
+void Program::fold_constants() {
+  std::vector<int> writes(size_t(register_count_), 0);
+  for_each_instruction(code_, [&](size_t, const Instruction& i) {
+    i.for_outputs([&](int32_t slot, int width) {
+      for (int k = 0; k < width; ++k) ++writes[size_t(slot + k)];
+    });
+  });
+  std::vector<float> values(size_t(register_count_), 0.0f);
+  std::copy(constants_.begin(), constants_.end(), values.begin());
+  std::vector<bool> known(size_t(register_count_), false);
+  std::fill_n(known.begin(), constants_.size(), true);
+  std::vector<bool> folded(code_.size() + 1, false);
+  bool any = false;
+  for_each_instruction(code_, [&](size_t at, const Instruction& i) {
+    bool constant = i.op.kind == OpKind::kPure;
+    i.for_inputs([&](int32_t slot, int width) {
+      for (int k = 0; k < width; ++k) constant = constant && known[size_t(slot + k)];
+    });
+    i.for_outputs([&](int32_t slot, int width) {
+      for (int k = 0; k < width; ++k) constant = constant && writes[size_t(slot + k)] == 1;
+    });
+    if (!constant) return;
+    ShadingPoint nowhere;
+    static const ShaderResources nothing{};
+    ShadeState state{nowhere, nothing, tables_.data(), nullptr};
+    i.op.run(Operands{i.operands, values.data()}, state);
+    i.for_outputs([&](int32_t slot, int width) {
+      for (int k = 0; k < width; ++k) known[size_t(slot + k)] = true;
+    });
+    folded[at] = any = true;
+  });
+  if (any) keep([&](size_t at, const Instruction&) { return !folded[at]; }, values, known);
+}
+
+// Rebuilds the program from the instructions that `wanted` keeps, with all known registers moved to the front as constants.
+template <class Wanted>
+void Program::keep(const Wanted& wanted, const std::vector<float>& values, const std::vector<bool>& known) {
+  // Renumber: known registers first. Values of width 3 stay together because all three are known or none is.
+  std::vector<int32_t> place(values.size());
+  std::vector<float> constants;
+  int32_t next = 0;
+  for (size_t r = 0; r < place.size(); ++r)
+    if (known[r]) place[r] = next++, constants.push_back(values[r]);
+  for (size_t r = 0; r < place.size(); ++r)
+    if (!known[r]) place[r] = next++;
+
+  std::vector<int32_t> code;
+  std::vector<int32_t> moved(code_.size() + 1);
+  std::vector<size_t> jumps;
+  for_each_instruction(code_, [&](size_t at, const Instruction& i) {
+    moved[at] = int32_t(code.size());
+    if (!wanted(at, i)) return;
+    const size_t start = code.size();
+    code.insert(code.end(), code_.begin() + ptrdiff_t(at), code_.begin() + ptrdiff_t(at) + i.op.width());
+    const int registers = int(std::strlen(i.op.outputs) + std::strlen(i.op.inputs));
+    for (int k = 0; k < registers; ++k) code[start + 1 + size_t(k)] = place[size_t(code[start + 1 + size_t(k)])];
+    if (code_[at] == kJump) jumps.push_back(start);
+  });
+  moved[code_.size()] = int32_t(code.size());
+  for (const size_t j : jumps) code[j + 2] = moved[size_t(code[j + 2])];
+  code_ = std::move(code);
+  constants_ = std::move(constants);
+}
+
+void Program::summarise() {
+  effects_ = 0, constant_ = true;
+  for_each_instruction(code_, [&](size_t, const Instruction& i) {
+    effects_ |= i.op.effects;
+    constant_ = constant_ && i.op.kind == OpKind::kClosure;
+  });
+  widths_.clear();
+  for (const Op& op : ops()) widths_.push_back(uint8_t(op.width()));
+}
+
+// Keeps the closures with one of `effects`, what they depend on, and all control: read backwards, an instruction is
+// needed if something later that is kept reads what it writes.
+Program Program::reduced_to(uint8_t effects) const {
+  std::vector<size_t> order;
+  for_each_instruction(code_, [&](size_t at, const Instruction&) { order.push_back(at); });
+  std::vector<bool> needed(size_t(register_count_), false), kept(code_.size() + 1, false);
+  for (size_t n = order.size(); n-- > 0;) {
+    const Op& op = ops()[size_t(code_[order[n]])];
+    const Instruction i{op, code_.data() + order[n] + 1};
+    bool keep_it = op.kind == OpKind::kControl || (op.kind == OpKind::kClosure && (op.effects & effects));
+    i.for_outputs([&](int32_t slot, int width) {
+      for (int k = 0; k < width; ++k) keep_it = keep_it || needed[size_t(slot + k)];
+    });
+    if (!keep_it) continue;
+    kept[order[n]] = true;
+    i.for_inputs([&](int32_t slot, int width) {
+      for (int k = 0; k < width; ++k) needed[size_t(slot + k)] = true;
+    });
+  }
+  Program reduced = *this;
+  reduced.transparency_.reset(), reduced.emission_.reset();
+  std::vector<bool> known(size_t(register_count_), false);
+  std::fill_n(known.begin(), constants_.size(), true);
+  std::vector<float> values(size_t(register_count_), 0.0f);
+  std::copy(constants_.begin(), constants_.end(), values.begin());
+  reduced.keep([&](size_t at, const Instruction&) { return bool(kept[at]); }, values, known);
+  reduced.summarise();
+  return reduced;
+}
+
+}  // namespace gi
