@@ -1,0 +1,88 @@
+"""Rendering without a window: opens a file, sets what was asked for, renders a frame into a file.
+
+Leaves out names of files (output.py), arguments and messages (cli.py).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from . import control
+
+
+class RenderError(RuntimeError):
+    """The scene could not be read or rendered; the message names what is wrong."""
+
+
+def open_file(path: Path) -> None:
+    """Opens a .blend in place of whatever is open, with Blender's factory settings and no scripts of the file."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        raise RenderError(f'"{path}" cannot be opened: {message_of(error)}') from error
+
+
+def register_once() -> None:
+    """Registers the engine where Blender does not know it yet. Before opening a file, whose settings need it."""
+    if not hasattr(bpy.types.Scene, "gi_engine"):
+        from . import register
+
+        register()
+
+
+def message_of(error: RuntimeError) -> str:
+    """What Blender's operators say, without their decoration."""
+    return str(error).strip().removeprefix("Error: ")
+
+
+def use_engine(scene: bpy.types.Scene, integrator: str | None) -> None:
+    scene.render.engine = "GI_ENGINE"
+    if integrator is not None:
+        scene.gi_engine.integrator = integrator
+
+
+def set_resolution(scene: bpy.types.Scene, width: int, height: int) -> None:
+    scene.render.resolution_x, scene.render.resolution_y = width, height
+    scene.render.resolution_percentage = 100
+
+
+def set_format(scene: bpy.types.Scene, suffix: str) -> None:
+    """The scene's own image settings where they make such files, else 8 bit PNG or float EXR with every pass."""
+    settings = scene.render.image_settings
+    multilayer = suffix == ".exr"
+    if hasattr(settings, "media_type"):  # from 5.0 on
+        settings.media_type = "MULTI_LAYER_IMAGE" if multilayer else "IMAGE"
+    if multilayer:
+        settings.file_format = "OPEN_EXR_MULTILAYER"
+        settings.color_depth = "32"
+    elif settings.file_format != "PNG":
+        settings.file_format = "PNG"
+        settings.color_mode = "RGBA" if scene.render.film_transparent else "RGB"
+        settings.color_depth = "8"
+
+
+def own_output(scene: bpy.types.Scene, frame: int) -> Path:
+    """Where the scene itself would put this frame. Raises RenderError where that is a video."""
+    if scene.render.is_movie_format:
+        raise RenderError(f'scene "{scene.name}" is set to write a video; name an image with -o')
+    return Path(bpy.path.abspath(scene.render.frame_path(frame=frame)))
+
+
+def render_frame(scene: bpy.types.Scene, frame: int, folder: Path, stem: str) -> None:
+    """Renders one frame into `folder` as `stem` and whatever suffix the format has."""
+    scene.frame_set(frame)
+    scene.render.filepath = escaped(str(folder / stem))
+    scene.render.use_file_extension = True
+    try:
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+    except RuntimeError as error:
+        errors = control.current.errors if control.current else []
+        raise RenderError("; ".join(errors) or message_of(error)) from error
+
+
+def escaped(path: str) -> str:
+    """From 5.0 on, braces in paths are Blender's templates."""
+    return path.replace("{", "{{").replace("}", "}}") if bpy.app.version >= (5, 0, 0) else path
