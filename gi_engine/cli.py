@@ -60,23 +60,47 @@ def run(argv: list[str], in_blender: bool = False) -> int:
 
 
 def parser(in_blender: bool) -> argparse.ArgumentParser:
-    program = argparse.ArgumentParser(prog="gi-engine", description="Global illumination for Blender scenes.", epilog=EPILOG)
+    program = argparse.ArgumentParser(
+        prog="gi-engine", description="Global illumination for Blender scenes.", epilog=EPILOG
+    )
     commands = program.add_subparsers(required=True, metavar="COMMAND")
     file = {"nargs": "?" if in_blender else None, "type": Path, "metavar": "FILE.blend"}
 
     render = commands.add_parser("render", help="render a .blend file", epilog=EPILOG)
     render.add_argument("file", **file)
-    render.add_argument("-o", "--output", type=Path, metavar="OUT.png|.exr", help="default: where the scene says; '#'s hold the frame number")
+    render.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="OUT.png|.exr",
+        help="default: where the scene says; '#'s hold the frame number",
+    )
     render.add_argument("--integrator", metavar="ID", help="see `gi-engine integrators`")
     target = render.add_mutually_exclusive_group()
     target.add_argument("--samples", type=at_least_one, metavar="N", help="stop at N samples a pixel")
     target.add_argument("--time", type=positive, metavar="S", help="stop after S seconds of sampling")
-    target.add_argument("--noise", type=positive, metavar="X", help="stop when 95 %% of the pixels have a relative standard error under X")
+    target.add_argument(
+        "--noise",
+        type=positive,
+        metavar="X",
+        help="stop when 95 %% of the pixels have a relative standard error under X",
+    )
     render.add_argument("--resolution", type=resolution, metavar="WxH", help="pixels")
-    render.add_argument("--frame", type=frames, metavar="N|A-B", help="one frame or a range; default: the scene's current frame")
-    render.add_argument("--threads", type=at_least_one, metavar="N", help="default: all cores, or the scene's fixed number")
+    render.add_argument(
+        "--frame", type=frames, metavar="N|A-B", help="one frame or a range; default: the scene's current frame"
+    )
+    render.add_argument(
+        "--threads", type=at_least_one, metavar="N", help="default: all cores, or the scene's fixed number"
+    )
     render.add_argument("--seed", type=seed, metavar="N", help="another seed, another pattern of noise")
-    render.add_argument("--set", type=assignment, action="append", default=[], metavar="name=value", help="a parameter of the integrator")
+    render.add_argument(
+        "--set",
+        type=assignment,
+        action="append",
+        default=[],
+        metavar="name=value",
+        help="a parameter of the integrator",
+    )
     render.set_defaults(command=render_command)
 
     info = commands.add_parser("info", help="say what would be rendered and what is not supported", epilog=EPILOG)
@@ -147,7 +171,9 @@ def check_parameters(descriptor: dict, given: dict[str, str]) -> None:
     declared = {p["name"]: p for p in descriptor["parameters"]}
     for name, value in given.items():
         if name not in declared:
-            raise ArgumentError(f'--set: integrator "{descriptor["id"]}" has no parameter "{name}"; it has: {", ".join(declared)}')
+            raise ArgumentError(
+                f'--set: integrator "{descriptor["id"]}" has no parameter "{name}"; it has: {", ".join(declared)}'
+            )
         problem = value_problem(declared[name], value)
         if problem:
             raise ArgumentError(f"--set: {name} {problem}")
@@ -155,7 +181,7 @@ def check_parameters(descriptor: dict, given: dict[str, str]) -> None:
 
 def value_problem(parameter: dict, value: str) -> str:
     """Why `value` cannot be the parameter's; "" if it can."""
-    kind = parameter["type"]
+    kind = parameter["type"].lower()
     if kind == "bool":
         return "" if value.lower() in ("0", "1", "false", "true", "off", "on") else f'is on or off, not "{value}"'
     if kind == "enum":
@@ -202,15 +228,19 @@ def render_command(arguments, out, err) -> int:
 
 def render_frames(arguments, headless, scene, wishes, display, streams) -> int:
     out, err = streams
-    headless.use_engine(scene, arguments.integrator)
-    check_parameters(find_integrator(scene.gi_engine.integrator), wishes.parameters)
+    headless.use_engine(scene)
+    check_parameters(find_integrator(arguments.integrator or scene.gi_engine.integrator), wishes.parameters)
     if arguments.resolution:
         headless.set_resolution(scene, *arguments.resolution)
     if arguments.output is not None:
         headless.set_format(scene, arguments.output.suffix.lower())
     chosen = arguments.frame or range(scene.frame_current, scene.frame_current + 1)
     for frame in chosen:
-        path = numbered(arguments.output, frame, len(chosen) > 1) if arguments.output else headless.own_output(scene, frame)
+        path = (
+            numbered(arguments.output, frame, len(chosen) > 1)
+            if arguments.output
+            else headless.own_output(scene, frame)
+        )
         best = control.Progress()
 
         def watch(progress):
@@ -223,7 +253,10 @@ def render_frames(arguments, headless, scene, wishes, display, streams) -> int:
         with Target(path) as target:
             headless.render_frame(scene, frame, target.folder, "picture")
             if best.passes == 0 and wishes.cancelled:
-                print(f"gi-engine: cancelled before the first pass of {path.name} was finished; nothing was written", file=err)
+                print(
+                    f"gi-engine: cancelled before the first pass of {path.name} was finished; nothing was written",
+                    file=err,
+                )
                 return CANCELLED
             if best.passes == 0:
                 raise headless.RenderError(f'scene "{scene.name}" was not rendered: no pass was finished')
@@ -244,7 +277,7 @@ def info_command(arguments, out, err) -> int:
     from . import info
 
     scene = headless.bpy.context.scene
-    headless.use_engine(scene, None)
+    headless.use_engine(scene)
     try:
         for line in info.lines(headless.bpy.context):
             print(line, file=out)
@@ -259,16 +292,20 @@ def integrators_command(arguments, out, err) -> int:
     for descriptor in native.integrators():
         print(f"{descriptor['id']}: {descriptor['label']}. {descriptor.get('blurb', '')}", file=out)
         for parameter in descriptor["parameters"]:
-            print(f"    {parameter['name']}={parameter['default']} ({range_of(parameter)})  {parameter.get('help', '')}", file=out)
+            print(
+                f"    {parameter['name']}={parameter['default']} ({range_of(parameter)})  {parameter.get('help', '')}",
+                file=out,
+            )
     return DONE
 
 
 def range_of(parameter: dict) -> str:
-    if parameter["type"] == "enum":
+    kind = parameter["type"].lower()
+    if kind == "enum":
         return " | ".join(item if isinstance(item, str) else item[0] for item in parameter["items"])
-    if parameter["type"] == "bool":
+    if kind == "bool":
         return "on | off"
-    return f"{parameter['type']}, {parameter.get('min')} to {parameter.get('max')} {parameter.get('unit', '')}".strip()
+    return f"{kind}, {parameter.get('min'):g} to {parameter.get('max'):g} {parameter.get('unit', '')}".strip()
 
 
 # What commands share
@@ -292,7 +329,13 @@ def overrides(arguments) -> dict:
     """Fields of Settings that the arguments set. One kind of limit replaces the scene's."""
     chosen = {}
     if arguments.samples or arguments.time or arguments.noise:
-        chosen = {"samples": arguments.samples or 0, "time_limit": arguments.time or 0.0, "noise_target": arguments.noise or 0.0}
+        chosen = {
+            "samples": arguments.samples or 0,
+            "time_limit": arguments.time or 0.0,
+            "noise_target": arguments.noise or 0.0,
+        }
+    if arguments.integrator is not None:
+        chosen["integrator"] = arguments.integrator
     if arguments.threads is not None:
         chosen["threads"] = arguments.threads
     if arguments.seed is not None:

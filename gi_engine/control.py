@@ -31,7 +31,9 @@ class Control:
     overrides: dict = field(default_factory=dict)
     parameters: dict = field(default_factory=dict)
     on_progress: Callable[[Progress], None] | None = None
-    cancelled: bool = False  # set by a signal handler; the engine stops after the poll that sees it and keeps what it has
+    cancelled: bool = (
+        False  # set by a signal handler; the engine stops after the poll that sees it and keeps what it has
+    )
     last: Progress = field(default_factory=Progress)
     warnings: list[str] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)

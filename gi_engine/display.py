@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
 import os
 import sys
 import time
@@ -73,7 +74,7 @@ def details(progress: Progress) -> str:
     left = seconds_left(progress)
     rate = progress.rays / progress.seconds if progress.seconds > 0.0 else 0.0
     words = [f"{progress.passes} passes", f"{duration(left)} left" if left is not None else "", f"{amount(rate)}rays/s"]
-    if progress.noise is not None:
+    if progress.noise is not None and math.isfinite(progress.noise):
         words.append(f"noise {progress.noise:.3g}")
     return ", ".join(word for word in words if word)
 
@@ -104,8 +105,18 @@ class RichDisplay:
         from rich import console
         from rich import progress as bars
 
-        columns = (bars.TextColumn("{task.description}"), bars.BarColumn(), bars.TaskProgressColumn(), bars.TextColumn("{task.fields[details]}"))
-        self.bar = bars.Progress(*columns, console=console.Console(file=stream, force_terminal=True), redirect_stdout=False, redirect_stderr=False)
+        columns = (
+            bars.TextColumn("{task.description}"),
+            bars.BarColumn(),
+            bars.TaskProgressColumn(),
+            bars.TextColumn("{task.fields[details]}"),
+        )
+        self.bar = bars.Progress(
+            *columns,
+            console=console.Console(file=stream, force_terminal=True),
+            redirect_stdout=False,
+            redirect_stderr=False,
+        )
         self.task = None
 
     def __enter__(self):

@@ -38,10 +38,8 @@ def message_of(error: RuntimeError) -> str:
     return str(error).strip().removeprefix("Error: ")
 
 
-def use_engine(scene: bpy.types.Scene, integrator: str | None) -> None:
+def use_engine(scene: bpy.types.Scene) -> None:
     scene.render.engine = "GI_ENGINE"
-    if integrator is not None:
-        scene.gi_engine.integrator = integrator
 
 
 def set_resolution(scene: bpy.types.Scene, width: int, height: int) -> None:

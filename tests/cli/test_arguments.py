@@ -55,7 +55,9 @@ def test_help_is_no_error(capfd):
     assert "130 cancelled" in capfd.readouterr().out
 
 
-@pytest.mark.parametrize(("text", "expected"), [("7", [7]), ("2-4", [2, 3, 4]), ("-3", [-3]), ("-3--1", [-3, -2, -1]), ("-1-1", [-1, 0, 1])])
+@pytest.mark.parametrize(
+    ("text", "expected"), [("7", [7]), ("2-4", [2, 3, 4]), ("-3", [-3]), ("-3--1", [-3, -2, -1]), ("-1-1", [-1, 0, 1])]
+)
 def test_frames(text, expected):
     assert list(cli.frames(text)) == expected
 

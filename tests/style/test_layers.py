@@ -8,10 +8,10 @@ import pytest
 # Each folder of native/src may include itself and what stands before it, one way only.
 NATIVE = {
     "core": set(),
-    "scene": {"core"},
-    "shading": {"core", "scene"},
-    "film": {"core", "scene", "shading"},
-    "lights": {"core", "scene", "shading"},
+    "shading": {"core"},
+    "scene": {"core", "shading"},
+    "film": {"core", "shading", "scene"},
+    "lights": {"core", "shading", "scene"},
     "transport": {"core", "scene", "film", "shading", "lights"},
     "integrators": {"core", "scene", "film", "shading", "lights", "transport"},
     "render": {"core", "scene", "film", "shading", "lights", "transport", "integrators"},
@@ -98,7 +98,9 @@ def test_blender_stays_at_the_border(root):
     wrong = []
     for path in python_sources(root):
         inside = path.relative_to(root / "gi_engine")
-        allowed = inside.parts[0] in MAY_USE_BLENDER_FOLDERS or (len(inside.parts) == 1 and inside.stem in MAY_USE_BLENDER)
+        allowed = inside.parts[0] in MAY_USE_BLENDER_FOLDERS or (
+            len(inside.parts) == 1 and inside.stem in MAY_USE_BLENDER
+        )
         used = BLENDER & set(imported(path))
         if used and not allowed:
             wrong.append(f"{inside}: {', '.join(sorted(used))}")
@@ -107,5 +109,9 @@ def test_blender_stays_at_the_border(root):
 
 def test_only_native_imports_the_compiled_part(root):
     """Statically or through importlib; a missing build then gives one clear message."""
-    users = {p.name for p in python_sources(root) if '"gi_engine_native"' in p.read_text() or "gi_engine_native" in set(imported(p))}
+    users = {
+        p.name
+        for p in python_sources(root)
+        if '"gi_engine_native"' in p.read_text() or "gi_engine_native" in set(imported(p))
+    }
     assert users <= {"native.py"}

@@ -57,7 +57,11 @@ def test_no_forbidden_words(root):
         if path.suffix not in TEXT or path == Path(__file__):
             continue
         for number, line in enumerate(path.read_text(errors="ignore").splitlines(), 1):
-            wrong += [f"{path.relative_to(root)}:{number}: {what}: {line.strip()[:80]}" for what, pattern in FORBIDDEN.items() if pattern.search(line)]
+            wrong += [
+                f"{path.relative_to(root)}:{number}: {what}: {line.strip()[:80]}"
+                for what, pattern in FORBIDDEN.items()
+                if pattern.search(line)
+            ]
     assert not wrong, "\n".join(wrong)
 
 
@@ -80,6 +84,8 @@ def test_versions_are_pinned_exactly(root):
     """One version of everything, so that what passed the tests is what runs."""
     text = (root / "pyproject.toml").read_text() + (root / "native/pyproject.toml").read_text()
     requirements = re.findall(r'^\s*"([A-Za-z][\w.-]*)([^";]*)[";]', text, re.M)
-    loose = [name for name, version in requirements if not version.strip().startswith("==") and name != "gi-engine-native"]
+    loose = [
+        name for name, version in requirements if not version.strip().startswith("==") and name != "gi-engine-native"
+    ]
     assert requirements
     assert not loose

@@ -1,5 +1,6 @@
 // Distribution ray tracing [Cook, Porter & Carpenter 1984]: soft shadows from lights of a size, blurred reflection and
 // refraction, depth of field. Light that rough surfaces send to one another is left out.
+#include "integrators/integrator.h"
 #include "transport/direct_light.h"
 #include "transport/first_hit.h"
 

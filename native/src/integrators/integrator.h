@@ -1,31 +1,17 @@
 // What an integrator is: passes that each add one estimate of the whole image. A new one is one .cpp file with its
 // descriptor at the end, and one line in registry.cpp; panels, options and tests come from the descriptor.
 #pragma once
-#include <atomic>
 #include <functional>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "core/parallel.h"
 #include "core/sampler.h"
 #include "film/film.h"
-#include "lights/lights.h"
-#include "scene/camera.h"
-#include "scene/scene.h"
+#include "transport/render_context.h"
 
 namespace gi {
-
-struct RenderContext {
-  const Scene& scene;
-  const LightSet& lights;
-  const Camera& camera;
-  ThreadPool& pool;
-  uint32_t seed = 0;
-  const std::atomic<bool>& cancelled;
-  std::atomic<int>& tiles_done;  // of the pass under way
-};
 
 // A value that the user sets. Numbers, switches and choices are all kept as a double (a choice by its index).
 struct Parameter {

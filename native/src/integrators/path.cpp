@@ -1,5 +1,6 @@
 // Path tracing [Kajiya 1986] with Russian roulette and multiple importance sampling [Veach 1997].
 // Each bounce: continue with probability α; draw ω from P; weigh by ρbd cos θ / (P(ω) α); add Le where a luminaire is met.
+#include "integrators/integrator.h"
 #include "transport/direct_light.h"
 #include "transport/first_hit.h"
 

@@ -1,6 +1,7 @@
 // Ray tracing [Whitted 1980]: mirror and glass chains down to the first rough surface, which every light illuminates
 // from its centre alone: hard shadows, no light between rough surfaces. Reflection and refraction are not branched but
 // drawn at random over the passes. The world has no centre: it is sampled at random.
+#include "integrators/integrator.h"
 #include "transport/direct_light.h"
 #include "transport/first_hit.h"
 

@@ -1,8 +1,8 @@
 // Direct light, both ways: by choosing a light and a direction to it, and by what a ray meets by itself.
 // The two are weighed by multiple importance sampling. [Veach 1997, ch. 9]
 #pragma once
-#include "integrators/integrator.h"
 #include "transport/path_state.h"
+#include "transport/render_context.h"
 
 namespace gi {
 

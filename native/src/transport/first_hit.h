@@ -1,6 +1,7 @@
 // What the film's data passes want to know of the first surface that is not see-through.
 #pragma once
-#include "integrators/integrator.h"
+#include "film/film.h"
+#include "transport/render_context.h"
 
 namespace gi {
 
