@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 import traceback
 
@@ -45,7 +46,9 @@ class GIEngine(bpy.types.RenderEngine):
 
     def export(self, depsgraph) -> Exported:
         overrides = control.current.overrides if control.current else {}
-        found = export(depsgraph, native.integrators(), self, (self.resolution_x, self.resolution_y), overrides.get("integrator"))
+        found = export(
+            depsgraph, native.integrators(), self, (self.resolution_x, self.resolution_y), overrides.get("integrator")
+        )
         found.settings = control.apply(found.settings)
         if self.is_preview:
             found.settings.samples = min(found.settings.samples, PREVIEW_SAMPLES)
@@ -82,7 +85,9 @@ class GIEngine(bpy.types.RenderEngine):
             self.warn(message)
         x0, y0, x1, y1 = scene.film.region
         if (x1 - x0, y1 - y0) != (result.resolution_x, result.resolution_y):
-            raise RuntimeError(f"border is {x1 - x0}x{y1 - y0} pixels, Blender expects {result.resolution_x}x{result.resolution_y}")
+            raise RuntimeError(
+                f"border is {x1 - x0}x{y1 - y0} pixels, Blender expects {result.resolution_x}x{result.resolution_y}"
+            )
         self.update_stats("", "Building the scene")
         control.report(control.Progress(stage="Build"))
         with Session(scene, settings) as session:
@@ -103,7 +108,10 @@ class GIEngine(bpy.types.RenderEngine):
                 shown = time.monotonic()
             self.tell(session.progress())
         self.show(session, result)
-        self.tell(session.progress())
+        progress = session.progress()
+        self.tell(progress)
+        if progress["bad_samples"]:
+            self.warn(f"{progress['bad_samples']} samples were not finite numbers and were left out")
 
     def show(self, session: Session, result) -> None:
         for blender_pass in result.layers[0].passes:
@@ -114,8 +122,9 @@ class GIEngine(bpy.types.RenderEngine):
 
     def tell(self, progress: dict) -> None:
         self.update_progress(progress["fraction"])
-        left = seconds_left(progress)
-        memory = progress.get("memory", 0) / 2**20
+        left = progress["remaining"] if math.isfinite(progress["remaining"]) else None
+        noise = progress["noise"] if math.isfinite(progress["noise"]) else None
+        memory = progress["memory"] / 2**20
         self.update_memory_stats(memory_used=memory, memory_peak=memory)
         self.update_stats("", status(progress, left))
         control.report(
@@ -126,7 +135,7 @@ class GIEngine(bpy.types.RenderEngine):
                 rays=progress["rays"],
                 seconds=progress["seconds"],
                 seconds_left=left,
-                noise=progress.get("noise"),
+                noise=noise,
             )
         )
 
@@ -157,11 +166,6 @@ def describe(error: Exception) -> str:
         traceback.print_exception(error)
         return f"internal error: {type(error).__name__}: {error}"
     return str(error)
-
-
-def seconds_left(progress: dict) -> float | None:
-    fraction = progress["fraction"]
-    return progress["seconds"] * (1 - fraction) / fraction if fraction > 0 else None
 
 
 def status(progress: dict, left: float | None) -> str:

@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import functools
 import importlib
+import importlib.util
+import os
+from pathlib import Path
+
+EMBREE_VARIABLE = "GI_ENGINE_EMBREE"  # environment: another Embree library to load
+EMBREE_FILES = ("../embreex.libs/libembree4*.so*", "../embreex.libs/embree4*.dll", ".dylibs/libembree4*.dylib")
 
 
 class NativeMissing(RuntimeError):
@@ -32,3 +38,25 @@ def available() -> bool:
 def integrators() -> list[dict]:
     """Descriptors of the integrators; none without the compiled part."""
     return module().integrators() if available() else []
+
+
+@functools.cache
+def embree_path() -> str:
+    """The Embree library of the installed embreex package, never Blender's own copy. Raises NativeMissing."""
+    chosen = os.environ.get(EMBREE_VARIABLE)
+    if chosen:
+        return chosen
+    spec = importlib.util.find_spec("embreex")  # finds it without importing
+    if spec is None or not spec.origin:
+        raise NativeMissing("the package embreex, which brings the Embree library, is not installed")
+    package = Path(spec.origin).parent
+    for pattern in EMBREE_FILES:
+        folder, name = os.path.split(pattern)
+        for found in sorted((package / folder).resolve().glob(name)):
+            return str(found)
+    raise NativeMissing(f"no Embree library beside {package}: reinstall the package embreex")
+
+
+def build_scene(scene, threads: int = 0):
+    """The native scene of a scene_data.Scene. Raises ValueError naming what is wrong with it."""
+    return module().Scene(scene, embree=embree_path(), threads=threads)

@@ -38,7 +38,9 @@ def fixed_properties() -> dict:
     return {
         "is_own": BoolProperty(name="Own Settings", description="Off: samples, bounces, film and so on are Cycles'"),
         "samples": IntProperty(name="Samples", description="Samples of each pixel", default=128, min=1, max=1 << 24),
-        "time_limit": FloatProperty(name="Time Limit", description="Seconds of sampling; 0 for no limit", min=0, unit="TIME_ABSOLUTE"),
+        "time_limit": FloatProperty(
+            name="Time Limit", description="Seconds of sampling; 0 for no limit", min=0, unit="TIME_ABSOLUTE"
+        ),
         "noise_target": FloatProperty(
             name="Noise Target",
             description="Stops when 95 % of the pixels have a relative standard error below this; 0 for no target",
@@ -48,10 +50,18 @@ def fixed_properties() -> dict:
         ),
         "seed": IntProperty(name="Seed", description="Another seed gives another pattern of noise", min=0),
         "use_animated_seed": BoolProperty(name="Animate Seed", description="Another seed for each frame"),
-        "film_exposure": FloatProperty(name="Exposure", description="Image brightness scale", default=1, min=0, soft_max=10),
-        "transparent_glass": BoolProperty(name="Transparent Glass", description="Glass shows what is behind the scene as transparent"),
+        "film_exposure": FloatProperty(
+            name="Exposure", description="Image brightness scale", default=1, min=0, soft_max=10
+        ),
+        "transparent_glass": BoolProperty(
+            name="Transparent Glass", description="Glass shows what is behind the scene as transparent"
+        ),
         "transparent_roughness": FloatProperty(
-            name="Roughness Threshold", description="Rougher transmission than this stays opaque", default=0.1, min=0, max=1
+            name="Roughness Threshold",
+            description="Rougher transmission than this stays opaque",
+            default=0.1,
+            min=0,
+            max=1,
         ),
         "pixel_filter": EnumProperty(name="Pixel Filter", items=FILTERS, default="BLACKMAN_HARRIS"),
         "filter_width": FloatProperty(
@@ -64,20 +74,12 @@ def property_of(parameter: dict):
     """A bpy property for one parameter of a descriptor."""
     options = {"name": parameter["label"], "description": parameter.get("help", ""), "default": parameter["default"]}
     kind = parameter["type"]
-    if kind == "bool":
+    if kind == "BOOL":
         return BoolProperty(**options)
-    if kind == "enum":
-        return EnumProperty(items=[enum_item(item) for item in parameter["items"]], **options)
-    limits = {side: parameter[side] for side in ("min", "max") if parameter.get(side) is not None}
-    return (IntProperty if kind == "int" else FloatProperty)(**options, **limits)
-
-
-def enum_item(item) -> tuple[str, str, str]:
-    """Descriptors give (id, label, help), or as little as the id."""
-    if isinstance(item, str):
-        return (item, item.replace("_", " ").title(), "")
-    identifier, label, text = (*item, "", "")[:3]
-    return (identifier, label or identifier, text)
+    if kind == "ENUM":
+        return EnumProperty(items=list(parameter["items"]), **options)
+    number, make = {"INT": (int, IntProperty), "FLOAT": (float, FloatProperty)}[kind]
+    return make(min=number(parameter["min"]), max=number(parameter["max"]), **options)
 
 
 def shared_parameters(descriptors: list[dict]) -> dict[str, dict]:
@@ -95,7 +97,9 @@ def settings_group(descriptors: list[dict], groups: dict[str, type]) -> type:
     items = [(d["id"], d["label"], d.get("blurb", "")) for d in descriptors] or [("path", "Path tracing", "")]
     default = next((item[0] for item in items if item[0] == "path"), items[0][0])
     annotations = fixed_properties()
-    annotations["integrator"] = EnumProperty(name="Integrator", items=items, default=default, description="How light is followed")
+    annotations["integrator"] = EnumProperty(
+        name="Integrator", items=items, default=default, description="How light is followed"
+    )
     for name, parameter in shared_parameters(descriptors).items():
         annotations[name] = property_of(parameter)
     for name in annotations.keys() & SHARED.keys():

@@ -19,9 +19,8 @@ class Session:
     """Owns the native scene and session. Use as a context manager: leaving it stops the threads."""
 
     def __init__(self, scene: Scene, settings: Settings):
-        gi = native.module()
-        self.native_scene = gi.Scene(scene)
-        self.native = gi.Session(self.native_scene, settings)
+        self.native_scene = native.build_scene(scene, settings.threads)
+        self.native = native.module().Session(self.native_scene, scene.camera, scene.film, settings)
 
     def __enter__(self) -> Session:
         self.native.start()
@@ -46,4 +45,4 @@ class Session:
 
     def warnings(self) -> list[str]:
         """What the native side found wrong with the scene."""
-        return list(getattr(self.native_scene, "warnings", ()))
+        return list(self.native_scene.warnings)

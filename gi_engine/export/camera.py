@@ -35,7 +35,9 @@ def export_camera(engine, camera_object, render, width: int, height: int, warnin
         fit = data.sensor_fit
         sensor = data.sensor_height if fit == "VERTICAL" else data.sensor_width
         extent = data.ortho_scale if kind == "ORTHO" else sensor / data.lens
-        camera.view_plane = view_plane(fit, extent, shift, width * render.pixel_aspect_x, height * render.pixel_aspect_y)
+        camera.view_plane = view_plane(
+            fit, extent, shift, width * render.pixel_aspect_x, height * render.pixel_aspect_y
+        )
     if data.dof.use_dof:
         set_depth_of_field(camera, data, matrix)
     return camera

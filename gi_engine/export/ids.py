@@ -25,8 +25,7 @@ def hash_words(x: int, y: int) -> int:
 def hash_name(name: str) -> int:
     h = 0
     for byte in name.encode():
-        # Bytes are signed characters in the other engines.
-        h = (h * 37 + (byte if byte < 128 else byte - 256)) & MASK
+        h = (h * 37 + byte) & MASK
     return h
 
 

@@ -28,7 +28,7 @@ def export_mesh(mesh, name: str, wanted: set[str]) -> Mesh | None:
     active_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
     return Mesh(
         name=name,
-        positions=read(mesh.attributes["position"].data, "vector", 3, np.float32),
+        positions=read_positions(mesh),
         corner_vert=read(mesh.attributes[".corner_vert"].data, "value", 1, np.int32),
         tri_corner=tri_corner,
         tri_face=read(mesh.loop_triangle_polygons, "value", 1, np.int32),
@@ -39,6 +39,14 @@ def export_mesh(mesh, name: str, wanted: set[str]) -> Mesh | None:
         active_uv=active_uv,
         texture_space=(tuple(mesh.texspace_location), tuple(mesh.texspace_size)),
     )
+
+
+def read_positions(mesh) -> np.ndarray:
+    """(V, 3) float32 with one number of slack behind the last: Embree reads vertices 16 bytes at a time."""
+    count = 3 * len(mesh.vertices)
+    buffer = np.zeros(count + 1, np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", buffer[:count])
+    return buffer[:count].reshape(-1, 3)
 
 
 def read_normals(mesh) -> tuple[str, np.ndarray | None]:

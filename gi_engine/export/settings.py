@@ -100,4 +100,6 @@ def parameters_of(scene, descriptor: dict) -> dict:
     """The integrator's parameters by name."""
     own = getattr(scene.gi_engine, descriptor["id"])
     names = [p["name"] for p in descriptor["parameters"]]
-    return {name: value_of(scene, name) if name in SHARED else getattr(own, name) for name in names}
+    values = {name: value_of(scene, name) if name in SHARED else getattr(own, name) for name in names}
+    # Switches are numbers to the native side.
+    return {name: int(value) if isinstance(value, bool) else value for name, value in values.items()}

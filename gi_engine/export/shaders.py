@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bpy
+
 from ..scene_data import Scene
 from .mesh import UNDEFORMED
 from .warnings import Warnings
@@ -26,7 +28,7 @@ class Shaders:
 
     def light(self, light) -> int:
         """-1 where the lamp has no nodes of its own."""
-        return self.once(light, self.compiler.light) if light.use_nodes and light.node_tree else -1
+        return self.once(light, self.compiler.light) if has_nodes(light) else -1
 
     def world(self, world) -> int:
         return self.once(world, self.compiler.world)
@@ -43,3 +45,8 @@ class Shaders:
 
     def object_attributes(self, prototype) -> dict[str, tuple]:
         return {}
+
+
+def has_nodes(owner) -> bool:
+    """From 5.0 on, every material, lamp and world has its nodes in use."""
+    return owner.node_tree is not None and (bpy.app.version >= (5, 0, 0) or owner.use_nodes)

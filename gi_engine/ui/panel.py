@@ -37,5 +37,3 @@ def setting(layout, scene, name: str, **options) -> None:
 
 def has_setting(scene, name: str) -> bool:
     return name in scene.gi_engine.bl_rna.properties
-
-

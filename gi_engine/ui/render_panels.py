@@ -8,7 +8,14 @@ from .. import native
 from ..export.settings import SHARED
 from .panel import Panel, RenderPanel, columns, has_setting, setting
 
-BOUNCES = ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "transparent_bounces", "min_bounces")
+BOUNCES = (
+    "max_bounces",
+    "diffuse_bounces",
+    "glossy_bounces",
+    "transmission_bounces",
+    "transparent_bounces",
+    "min_bounces",
+)
 CLAMPING = ("clamp_direct", "clamp_indirect")
 CAUSTICS = ("filter_glossy", "caustics_reflective", "caustics_refractive")
 
