@@ -65,6 +65,12 @@ Lobe make_lobe(const std::string& name, const Parameters& p) {
   if (name == "lambert") return Lambert{};
   if (name.starts_with("ggx_")) return make_microfacet<Ggx>(name.substr(4), p);
   if (name.starts_with("beckmann_")) return make_microfacet<Beckmann>(name.substr(9), p);
+  if (name == "oren_nayar") return OrenNayar(p.c("color", Rgb(0.8f)), p.f("roughness", 1.0f), p.f("transmits", 0.0f) != 0.0f);
+  if (name == "translucent") return Translucent{};
+  if (name == "thin_transmission") return ThinTransmission(p.f("alpha", 0.25f), p.f("cos_o", 1.0f));
+  if (name == "sheen") return Sheen(p.f("roughness", 0.5f), p.f("cos_o", 1.0f));
+  if (name == "velvet") return Velvet(p.f("sigma", 0.5f));
+  if (name == "toon") return Toon(p.f("size", 0.5f), p.f("smooth", 0.0f), p.f("glossy", 0.0f) != 0.0f);
   if (name == "ashikhmin_shirley") return AshikhminShirley::make(p.f("alpha_x", 0.25f), p.f("alpha_y", 0.25f));
   throw InputError("unknown lobe: " + name);
 }

@@ -5,9 +5,15 @@
 #include "shading/lobes/ashikhmin_shirley.h"
 #include "shading/lobes/lambert.h"
 #include "shading/lobes/microfacet.h"
+#include "shading/lobes/oren_nayar.h"
+#include "shading/lobes/sheen.h"
+#include "shading/lobes/thin_transmission.h"
+#include "shading/lobes/toon.h"
+#include "shading/lobes/translucent.h"
 
 namespace gi {
 
-using Lobe = std::variant<Lambert, GgxLobe, BeckmannLobe, AshikhminShirley>;
+using Lobe = std::variant<Lambert, OrenNayar, Translucent, GgxLobe, BeckmannLobe, AshikhminShirley, ThinTransmission, Sheen,
+                          Velvet, Toon>;
 
 }  // namespace gi

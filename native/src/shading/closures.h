@@ -1,0 +1,58 @@
+// What the closure ops share: adding a lobe under Cycles' rules, normals, tangents, layering. Knows lobes, not node trees.
+#pragma once
+#include "shading/program.h"
+#include "shading/shading_normal.h"
+
+namespace gi {
+
+std::span<const Op> closure_ops();
+
+// Adds a lobe about normal `n`, with `tangent` as the frame's x axis unless it is zero.
+inline void add_lobe(ShadeState& s, Rgb weight, const Lobe& lobe, Vec3 n, Vec3 tangent = {0, 0, 0}) {
+  s.bsdf->add(weight, lobe, Frame::from_normal_and_tangent(n, tangent));
+}
+
+// Lambert, or Oren-Nayar where it is rough. `color` is the albedo whose multiple scattering is kept.
+inline void add_diffuse(ShadeState& s, Rgb weight, Rgb color, float roughness, Vec3 n) {
+  if (roughness < 1e-5f) return add_lobe(s, weight, Lambert{}, n);
+  add_lobe(s, weight, OrenNayar(color, roughness), n);
+}
+
+// A normal socket's value; the shading normal where it is not linked.
+inline Vec3 normal_or_shading(const ShadeState& s, Vec3 n) { return normalize_or(n, s.point.ns); }
+
+inline Vec3 visible_normal(const ShadeState& s, Vec3 n) { return valid_reflection_normal(s.point.ng, s.point.wo, n); }
+
+// `v` turned by `angle` radians, right-handed, about the unit `axis`. [Rodrigues]
+inline Vec3 rotated(Vec3 v, Vec3 axis, float angle) {
+  const float c = std::cos(angle), sn = std::sin(angle);
+  return v * c + cross(axis, v) * sn + axis * (dot(axis, v) * (1.0f - c));
+}
+
+inline constexpr float kFilmCutoff = 0.1f;  // nanometres under which there is no film
+inline Fresnel with_film(const Fresnel& bare, float /*thickness*/, float /*ior*/) { return bare; }
+
+struct Anisotropy {
+  float alpha_x, alpha_y;
+  Vec3 tangent;
+};
+// As the Principled and the Metallic BSDF read it: `rotation` in turns; isotropic where there is no tangent.
+inline Anisotropy anisotropy(float roughness, float amount, float rotation, Vec3 n, Vec3 tangent) {
+  const float alpha = sqr(roughness);
+  if (amount <= 0.0f || tangent == Vec3{}) return {alpha, alpha, {}};
+  const float aspect = std::sqrt(1.0f - 0.9f * amount);
+  return {alpha / aspect, alpha * aspect, rotated(tangent, n, rotation * 2.0f * kPi)};
+}
+
+// The weight left for what lies under a layer that reflects `albedo` (its own weight included) out of `weight`: the channel
+// that reflects most decides, so that no hue is made by layering.
+inline Rgb under_layer(Rgb weight, Rgb albedo) {
+  float most = 0.0f;
+  for (int i = 0; i < 3; ++i) most = std::max(most, safe_divide(albedo[i], weight[i]));
+  return weight * clamp01(1.0f - most);
+}
+
+inline Rgb positive(Rgb c) { return {std::max(c.r, 0.0f), std::max(c.g, 0.0f), std::max(c.b, 0.0f)}; }
+inline Rgb clamped(Rgb c) { return {clamp01(c.r), clamp01(c.g), clamp01(c.b)}; }
+
+}  // namespace gi

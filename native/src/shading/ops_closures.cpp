@@ -1,0 +1,188 @@
+// Ops that end a node tree: each adds lobes, emission, transparency or holdout to state.bsdf. The first input is always the
+// weight that Mix Shader leaves. A zero vector for a normal or a tangent means "not linked". Leaves out volumes and hair.
+#include "shading/closures.h"
+#include "shading/principled.h"
+
+namespace gi {
+namespace {
+
+void mix_weights(const Operands& o, ShadeState&) {
+  const float w = o.f(2), second = clamp01(o.f(3));
+  o.set(0, w * (1.0f - second)), o.set(1, w * second);
+}
+
+void emission(const Operands& o, ShadeState& s) {
+  if (s.bsdf) s.bsdf->emission += o.c(1) * (o.f(0) * o.f(2));
+}
+
+void transparent(const Operands& o, ShadeState& s) {
+  if (s.bsdf) s.bsdf->transparency += o.c(1) * o.f(0);
+}
+
+// What Alpha lets through; the lobes that go with it scale their own weight.
+void alpha(const Operands& o, ShadeState& s) {
+  if (s.bsdf) s.bsdf->transparency += Rgb(o.f(0) * (1.0f - clamp01(o.f(1))));
+}
+
+void holdout(const Operands& o, ShadeState& s) {
+  if (s.bsdf) s.bsdf->holdout += Rgb(o.f(0));
+}
+
+void diffuse(const Operands& o, ShadeState& s) {
+  if (s.bsdf) add_diffuse(s, o.c(1) * o.f(0), o.c(1), o.f(2), normal_or_shading(s, o.v(3)));
+}
+
+void translucent(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  add_lobe(s, o.c(1) * o.f(0), Translucent{}, visible_normal(s, normal_or_shading(s, o.v(2))));
+}
+
+void sheen(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  const Vec3 n = normal_or_shading(s, o.v(3));
+  add_lobe(s, o.c(1) * o.f(0), Sheen(o.f(2), dot(n, s.point.wo)), n);
+}
+
+void velvet(const Operands& o, ShadeState& s) {
+  if (s.bsdf) add_lobe(s, o.c(1) * o.f(0), Velvet(o.f(2)), normal_or_shading(s, o.v(3)));
+}
+
+void toon(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  add_lobe(s, o.c(1) * o.f(0), Toon(o.f(2), o.f(3), o.imm(5) != 0), normal_or_shading(s, o.v(4)));
+}
+
+enum Distribution { kGgx, kBeckmann, kAshikhminShirley, kMultiscatterGgx };  // the immediates' meaning
+
+// A GGX or Beckmann lobe made by `make<LobeType>()`. Only Multiscatter GGX gets back what single bounces lose.
+template <class Make>
+void add_facets(ShadeState& s, Rgb weight, int distribution, Vec3 n, Vec3 tangent, Make make) {
+  if (distribution == kBeckmann) return add_lobe(s, weight, make.template operator()<BeckmannLobe>(), n, tangent);
+  GgxLobe lobe = make.template operator()<GgxLobe>();
+  if (distribution == kMultiscatterGgx) lobe.preserve_energy(clamp01(dot(n, s.point.wo)));
+  add_lobe(s, weight, lobe, n, tangent);
+}
+
+void glossy(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  const Rgb color = positive(o.c(1));
+  const Vec3 n = visible_normal(s, normal_or_shading(s, o.v(5)));
+  const float alpha = sqr(clamp01(o.f(2))), a = std::clamp(o.f(3), -0.99f, 0.99f);
+  float ax = alpha, ay = alpha;
+  Vec3 tangent = o.v(6);
+  if (std::abs(a) > 1e-4f && !(tangent == Vec3{})) {
+    ax = a < 0.0f ? alpha / (1.0f + a) : alpha * (1.0f - a);
+    ay = a < 0.0f ? alpha * (1.0f + a) : alpha / (1.0f - a);
+    tangent = rotated(tangent, n, o.f(4) * 2.0f * kPi);
+  }
+  const int distribution = o.imm(7);
+  if (distribution == kAshikhminShirley) return add_lobe(s, color * o.f(0), AshikhminShirley::make(ax, ay), n, tangent);
+  if (distribution == kBeckmann) return add_lobe(s, color * o.f(0), BeckmannLobe::reflection(ax, ay, Fresnel::none()), n, tangent);
+  GgxLobe lobe = GgxLobe::reflection(ax, ay, Fresnel::none());
+  if (distribution == kMultiscatterGgx) lobe.preserve_energy(clamp01(dot(n, s.point.wo)), color);
+  add_lobe(s, color * o.f(0), lobe, n, tangent);
+}
+
+void refraction(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  const float ior = std::max(o.f(3), 1e-5f), alpha = sqr(o.f(2));
+  const Fresnel f = Fresnel::none(s.point.backfacing ? 1.0f / ior : ior);
+  add_facets(s, o.c(1) * o.f(0), o.imm(5), visible_normal(s, normal_or_shading(s, o.v(4))), {},
+             [&]<class L>() { return L::refraction(alpha, f); });
+}
+
+void glass(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  const Rgb color = positive(o.c(1));
+  const float alpha = sqr(clamp01(o.f(2))), ior = std::max(o.f(3), 1e-5f), film_ior = std::max(o.f(6), 1e-5f);
+  const bool inside = s.point.backfacing;
+  const Fresnel bare = Fresnel::schlick(inside ? 1.0f / ior : ior, Rgb(f0_from_ior(ior)), Rgb(1.0f), color, color);
+  const Fresnel f = with_film(bare, o.f(5), inside ? film_ior / ior : film_ior);
+  add_facets(s, Rgb(o.f(0)), o.imm(7), visible_normal(s, normal_or_shading(s, o.v(4))), {},
+             [&]<class L>() { return L::glass(alpha, f); });
+}
+
+void metallic(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  const bool physical = o.imm(11) != 0;
+  const Fresnel bare = physical ? Fresnel::conductor(positive(o.c(1)), positive(o.c(2)))
+                                : Fresnel::f82_tint(clamped(o.c(1)), clamped(o.c(2)));
+  const Fresnel f = with_film(bare, o.f(8), std::max(o.f(9), 1e-5f));
+  const Vec3 n = normal_or_shading(s, o.v(6)), tangent = o.v(7);
+  const Anisotropy a = anisotropy(clamp01(o.f(3)), clamp01(o.f(4)), o.f(5), n, tangent);
+  add_facets(s, Rgb(o.f(0)), o.imm(10), visible_normal(s, n), a.tangent,
+             [&]<class L>() { return L::reflection(a.alpha_x, a.alpha_y, f); });
+}
+
+// Operands one after the other, for the ops that have many.
+struct Reader {
+  const Operands& o;
+  int i = 0;
+  float f() { return o.f(i++); }
+  float unit() { return clamp01(o.f(i++)); }
+  float at_least(float low) { return std::max(o.f(i++), low); }
+  Vec3 v() { return o.v(i++); }
+  Rgb color() { return positive(o.c(i++)); }
+};
+
+PrincipledTop read_top(Reader& r) {  // coat: weight, roughness, ior, tint, normal; sheen: weight, roughness, tint
+  PrincipledTop t;
+  t.coat_weight = r.at_least(0.0f), t.coat_roughness = r.unit(), t.coat_ior = r.at_least(1.0f);
+  t.coat_tint = r.color(), t.coat_normal = r.v();
+  t.sheen_weight = r.at_least(0.0f), t.sheen_roughness = r.unit(), t.sheen_tint = r.color();
+  return t;
+}
+
+void principled(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  Reader r{o};
+  Principled p;
+  const float weight = r.f() * r.unit();  // mix, alpha
+  p.normal = normal_or_shading(s, r.v());
+  p.top = read_top(r);
+  p.base_color = r.color(), p.metallic = r.unit(), p.roughness = r.unit(), p.ior = r.at_least(1e-5f);
+  p.thin_wall = r.f() != 0.0f;
+  p.diffuse_roughness = r.unit(), p.subsurface_weight = r.unit(), p.subsurface_anisotropy = r.f();
+  p.specular_level = r.at_least(0.0f), p.specular_tint = r.color();
+  p.anisotropic = r.unit(), p.anisotropic_rotation = r.f(), p.tangent = r.v();
+  p.transmission = r.unit(), p.film_thickness = r.f(), p.film_ior = r.at_least(1e-5f);
+  p.preserve_energy = o.imm(r.i) == kMultiscatterGgx;
+  add_principled(s, p, Rgb(weight));
+}
+
+// The emission of a Principled BSDF lies under its coat and sheen.
+void principled_emission(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  Reader r{o};
+  const float weight = r.f() * r.unit();
+  const Vec3 n = normal_or_shading(s, r.v());
+  const PrincipledTop top = read_top(r);
+  const Rgb color = Rgb(r.v()), through = add_top_layers(s, top, n, Rgb(weight), false);
+  s.bsdf->emission += color * through * r.f();
+}
+
+// The second strings of the last two are what read_top reads.
+const Op kOps[] = {
+    {"mix_weights", "ff", "ff", 0, OpKind::kPure, mix_weights},
+    {"emission", "", "fvf", 0, OpKind::kClosure, emission, kAddsEmission},
+    {"transparent", "", "fv", 0, OpKind::kClosure, transparent, kAddsTransparency},
+    {"alpha", "", "ff", 0, OpKind::kClosure, alpha, kAddsTransparency},
+    {"holdout", "", "f", 0, OpKind::kClosure, holdout, kAddsLobe},
+    {"diffuse", "", "fvfv", 0, OpKind::kClosure, diffuse, kAddsLobe},
+    {"translucent", "", "fvv", 0, OpKind::kClosure, translucent, kAddsLobe},
+    {"sheen", "", "fvfv", 0, OpKind::kClosure, sheen, kAddsLobe},
+    {"velvet", "", "fvfv", 0, OpKind::kClosure, velvet, kAddsLobe},
+    {"toon", "", "fvffv", 1, OpKind::kClosure, toon, kAddsLobe},
+    {"glossy", "", "fvfffvv", 1, OpKind::kClosure, glossy, kAddsLobe},
+    {"refraction", "", "fvffv", 1, OpKind::kClosure, refraction, kAddsLobe},
+    {"glass", "", "fvffvff", 1, OpKind::kClosure, glass, kAddsLobe},
+    {"metallic", "", "fvvfffvvff", 2, OpKind::kClosure, metallic, kAddsLobe},
+    {"principled", "", "ffv" "fffvvffv" "vffff" "fff" "fv" "ffv" "fff", 1, OpKind::kClosure, principled, kAddsLobe},
+    {"principled_emission", "", "ffv" "fffvvffv" "vf", 0, OpKind::kClosure, principled_emission, kAddsEmission},
+};
+
+}  // namespace
+
+std::span<const Op> closure_ops() { return kOps; }
+
+}  // namespace gi
