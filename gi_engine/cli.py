@@ -16,6 +16,7 @@ from pathlib import Path
 
 from . import control, native
 from .display import display_on, duration, flush_all, quiet
+from .info import describe
 from .output import OutputError, Target, check_suffix, numbered
 
 DONE, FAILED, BAD_ARGUMENTS, CANCELLED = 0, 1, 2, 130
@@ -271,19 +272,30 @@ def render_frames(arguments, headless, scene, wishes, display, streams) -> int:
 
 def info_command(arguments, out, err) -> int:
     check_file(arguments)
+    native.module()
     headless = open_scene(arguments, err)
     if headless is None:
         return FAILED
-    from . import info
-
     scene = headless.bpy.context.scene
     headless.use_engine(scene)
+    layers = {}
+
+    def look(view_layer, exported, settings):
+        layers[view_layer] = describe(exported, settings)
+
+    control.current = wishes = control.Control(inspect=look)
     try:
-        for line in info.lines(headless.bpy.context):
-            print(line, file=out)
-    except ValueError as error:
+        headless.look_at(scene)
+    except headless.RenderError as error:
         print(f"gi-engine: {error}", file=err)
         return FAILED
+    finally:
+        control.current = None
+    print(f'scene: "{scene.name}", frame {scene.frame_current}', file=out)
+    for view_layer, lines in layers.items():
+        print(f'view layer: "{view_layer}"', *(f"  {line}" for line in lines), sep="\n", file=out)
+    for warning in wishes.warnings:
+        print(f"warning: {warning}", file=out)
     return DONE
 
 

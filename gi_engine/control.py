@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from .scene_data import Settings
+from .scene_data import Scene, Settings
 
 
 @dataclass
@@ -58,6 +58,14 @@ def report(progress: Progress) -> None:
 
 def cancelled() -> bool:
     return current is not None and current.cancelled
+
+
+def inspected(view_layer: str, scene: Scene, settings: Settings) -> bool:
+    """True where the caller only wanted to look at what would be rendered, and has."""
+    if current is None or current.inspect is None:
+        return False
+    current.inspect(view_layer, scene, settings)
+    return True
 
 
 def warn(message: str) -> None:

@@ -74,8 +74,18 @@ def render_frame(scene: bpy.types.Scene, frame: int, folder: Path, stem: str) ->
     scene.frame_set(frame)
     scene.render.filepath = escaped(str(folder / stem))
     scene.render.use_file_extension = True
+    start_render(scene, write_still=True)
+
+
+def look_at(scene: bpy.types.Scene) -> None:
+    """Goes through a render for control.inspect, leaving no file."""
+    scene.render.use_compositing = scene.render.use_sequencer = False
+    start_render(scene, write_still=False)
+
+
+def start_render(scene: bpy.types.Scene, write_still: bool) -> None:
     try:
-        bpy.ops.render.render(write_still=True, scene=scene.name)
+        bpy.ops.render.render(write_still=write_still, scene=scene.name)
     except RuntimeError as error:
         errors = control.current.errors if control.current else []
         raise RenderError("; ".join(errors) or message_of(error)) from error
