@@ -2,14 +2,14 @@
 
 
 def register() -> None:
-    from . import engine, properties, ui
+    from . import engine, headless, properties, ui
 
-    for part in (properties, engine, ui):
+    for part in (properties, engine, ui, headless):
         part.register()
 
 
 def unregister() -> None:
-    from . import engine, properties, ui
+    from . import engine, headless, properties, ui
 
-    for part in (ui, engine, properties):
+    for part in (headless, ui, engine, properties):
         part.unregister()

@@ -94,3 +94,24 @@ def start_render(scene: bpy.types.Scene, write_still: bool) -> None:
 def escaped(path: str) -> str:
     """From 5.0 on, braces in paths are Blender's templates."""
     return path.replace("{", "{{").replace("}", "}}") if bpy.app.version >= (5, 0, 0) else path
+
+
+# `blender -c gi_engine …`
+
+
+def run_in_blender(argv: list[str]) -> int:
+    from .cli import run
+
+    return run(argv, in_blender=True)
+
+
+_commands: list = []
+
+
+def register() -> None:
+    _commands.append(bpy.utils.register_cli_command("gi_engine", run_in_blender))
+
+
+def unregister() -> None:
+    while _commands:
+        bpy.utils.unregister_cli_command(_commands.pop())
