@@ -16,5 +16,6 @@ NB_MODULE(_core, m) {
     }
   });
   gi::bind::bind_render(m);
+  gi::bind::bind_shading(m);
   gi::bind::bind_lobes(m);
 }

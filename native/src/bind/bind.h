@@ -9,6 +9,7 @@
 namespace gi::bind {
 
 void bind_render(nanobind::module_& m);
+void bind_shading(nanobind::module_& m);
 void bind_lobes(nanobind::module_& m);
 
 // The images of a scene_data.Scene.

@@ -1,6 +1,8 @@
 // Reading scene_data's dataclasses, field by field. Arrays are shared with NumPy, which keeps them alive.
 #include "bind/read_scene.h"
 
+#include "bind/bind.h"
+
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -272,5 +274,7 @@ RenderSettings read_settings(nb::handle settings) {
   for (auto [name, value] : parameters) s.parameters[nb::cast<std::string>(nb::str(name))] = nb::cast<std::string>(nb::str(value));
   return s;
 }
+
+std::unique_ptr<ShaderResources> read_resources(nb::handle) { return std::make_unique<ShaderResources>(); }
 
 }  // namespace gi::bind

@@ -1,0 +1,15 @@
+// All ops in one table: the index is the op code. Python asks for the codes, so their order means nothing outside.
+#include "shading/ops.h"
+
+namespace gi {
+
+std::span<const Op> ops() {
+  static const std::vector<Op> all = [] {
+    std::vector<Op> table{{"jump_if_zero", "", "f", 1, OpKind::kControl, nullptr}};
+    for (const std::span<const Op> family : {closure_ops()}) table.insert(table.end(), family.begin(), family.end());
+    return table;
+  }();
+  return all;
+}
+
+}  // namespace gi
