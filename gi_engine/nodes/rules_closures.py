@@ -1,0 +1,222 @@
+"""Rules of the shader nodes: what they add to the surface, as closure ops. No bpy.
+
+Normal and Coat Normal that are not linked are the zero vector, which the ops take for the shading normal. What is not
+rendered (subsurface scattering, hair, volumes, ray portals) has its fallback and warning here.
+"""
+
+from __future__ import annotations
+
+from .program import COLOR, Value
+from .rules import closure_rule
+
+NONE = (0.0, 0.0, 0.0)  # a normal or tangent that is not linked
+CUTOFF = 1e-5  # weights below this do not show, as in Cycles
+DISTRIBUTIONS = {"GGX": 0, "BECKMANN": 1, "ASHIKHMIN_SHIRLEY": 2, "MULTI_GGX": 3}
+
+
+def number(b, value: Value) -> float | None:
+    """The value where it is a constant (of a colour the largest component), else None."""
+    for key, constant in b.builder.constants.items():
+        if constant.source == value.source:
+            return key[value.component] if value.width == 1 else max(key[:-1])
+    return None
+
+
+def is_zero(b, value: Value) -> bool:
+    n = number(b, value)
+    return n is not None and n <= CUTOFF
+
+
+def normal(b, name: str = "Normal"):
+    return b.linked_or(name, NONE)
+
+
+def tangent(b, anisotropy: Value):
+    """The Tangent socket; only looked up where the surface is anisotropic. Not linked: around the object's z axis."""
+    n = number(b, anisotropy)
+    if n is not None and abs(n) <= 1e-4:
+        return NONE
+    return b.linked_or("Tangent", b.op("default_tangent"))
+
+
+def film(b):
+    return b.input("Thin Film Thickness", default=0.0), b.input("Thin Film IOR", default=1.33)
+
+
+# -------------------------------------------------------------------- combining
+
+
+@closure_rule("ShaderNodeMixShader")
+def mix_shader(b, weight):
+    factor = b.input("Fac")
+    known = number(b, factor)
+    first, second = b.op("mix_weights", weight, factor)
+    for identifier, share, empty in (("Shader", first, 1.0), ("Shader_001", second, 0.0)):
+        if known is None:
+            with b.branch(share):
+                b.closure(identifier, share)
+        elif min(max(known, 0.0), 1.0) != empty:
+            b.closure(identifier, share)
+
+
+@closure_rule("ShaderNodeAddShader")
+def add_shader(b, weight):
+    b.closure("Shader", weight)
+    b.closure("Shader_001", weight)
+
+
+# -------------------------------------------------------------------- light and transparency
+
+
+@closure_rule("ShaderNodeEmission", "ShaderNodeBackground")
+def emission(b, weight):
+    color, strength = b.input("Color"), b.input("Strength")
+    if not is_zero(b, color) and number(b, strength) != 0.0:
+        b.op("emission", weight, color, strength)
+
+
+@closure_rule("ShaderNodeBsdfTransparent")
+def transparent(b, weight):
+    b.op("transparent", weight, b.input("Color"))
+
+
+@closure_rule("ShaderNodeHoldout")
+def holdout(b, weight):
+    b.op("holdout", weight)
+
+
+# -------------------------------------------------------------------- plain lobes
+
+
+@closure_rule("ShaderNodeBsdfDiffuse")
+def diffuse(b, weight):
+    b.op("diffuse", weight, b.input("Color"), b.input("Roughness"), normal(b))
+
+
+@closure_rule("ShaderNodeBsdfTranslucent")
+def translucent(b, weight):
+    b.op("translucent", weight, b.input("Color"), normal(b))
+
+
+@closure_rule("ShaderNodeBsdfSheen")
+def sheen(b, weight):
+    op = "velvet" if b.node.distribution == "ASHIKHMIN" else "sheen"
+    b.op(op, weight, b.input("Color"), b.input("Roughness"), normal(b))
+
+
+@closure_rule("ShaderNodeBsdfToon")
+def toon(b, weight):
+    glossy = b.node.component == "GLOSSY"
+    b.op("toon", weight, b.input("Color"), b.input("Size"), b.input("Smooth"), normal(b), imm=(glossy,))
+
+
+@closure_rule("ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfGlossy")
+def glossy(b, weight):
+    anisotropy = b.input("Anisotropy", default=0.0)
+    b.op(
+        "glossy", weight, b.input("Color"), b.input("Roughness"), anisotropy, b.input("Rotation", default=0.0),
+        normal(b), tangent(b, anisotropy), imm=(DISTRIBUTIONS[b.node.distribution],),
+    )  # fmt: skip
+
+
+@closure_rule("ShaderNodeBsdfRefraction")
+def refraction(b, weight):
+    distribution = DISTRIBUTIONS[b.node.distribution]
+    b.op("refraction", weight, b.input("Color"), b.input("Roughness"), b.input("IOR"), normal(b), imm=(distribution,))
+
+
+@closure_rule("ShaderNodeBsdfGlass")
+def glass(b, weight):
+    distribution = DISTRIBUTIONS[b.node.distribution]
+    b.op("glass", weight, b.input("Color"), b.input("Roughness"), b.input("IOR"), normal(b), *film(b), imm=(distribution,))
+
+
+@closure_rule("ShaderNodeBsdfMetallic")
+def metallic(b, weight):
+    physical = b.node.fresnel_type == "PHYSICAL_CONDUCTOR"
+    base, edge = ("IOR", "Extinction") if physical else ("Base Color", "Edge Tint")
+    anisotropy = b.input("Anisotropy")
+    b.op(
+        "metallic", weight, b.input(base), b.input(edge), b.input("Roughness"), anisotropy, b.input("Rotation"),
+        normal(b), tangent(b, anisotropy), *film(b), imm=(DISTRIBUTIONS[b.node.distribution], physical),
+    )  # fmt: skip
+
+
+# -------------------------------------------------------------------- Principled
+
+
+@closure_rule("ShaderNodeBsdfPrincipled")
+def principled(b, weight):
+    alpha = b.input("Alpha")
+    if (number(b, alpha) or 0.0) < 1.0:
+        b.op("alpha", weight, alpha)
+    base_normal, top = normal(b), principled_top(b)
+    principled_emission(b, weight, alpha, base_normal, top)
+    subsurface = b.input("Subsurface Weight")
+    if not is_zero(b, subsurface):
+        b.warn("subsurface scattering is not rendered yet; it is diffuse of the same albedo")
+    anisotropy = b.input("Anisotropic")
+    b.op(
+        "principled", weight, alpha, base_normal, *top,
+        b.input("Base Color"), b.input("Metallic"), b.input("Roughness"), b.input("IOR"), b.input("Thin Wall", default=0.0),
+        b.input("Diffuse Roughness"), subsurface, b.input("Subsurface Anisotropy"),
+        b.input("Specular IOR Level"), b.input("Specular Tint"),
+        anisotropy, b.input("Anisotropic Rotation"), tangent(b, anisotropy),
+        b.input("Transmission Weight"), *film(b), imm=(DISTRIBUTIONS[b.node.distribution],),
+    )  # fmt: skip
+
+
+def principled_top(b) -> tuple:
+    return (
+        b.input("Coat Weight"), b.input("Coat Roughness"), b.input("Coat IOR"), b.input("Coat Tint"), normal(b, "Coat Normal"),
+        b.input("Sheen Weight"), b.input("Sheen Roughness"), b.input("Sheen Tint"),
+    )  # fmt: skip
+
+
+def principled_emission(b, weight, alpha, base_normal, top) -> None:
+    """Emits only where there is something to emit: every emitting triangle becomes a light."""
+    color, strength = b.input("Emission Color"), b.input("Emission Strength")
+    if not is_zero(b, color) and not is_zero(b, strength):
+        b.op("principled_emission", weight, alpha, base_normal, *top, color, strength)
+
+
+# -------------------------------------------------------------------- fallbacks
+
+
+@closure_rule("ShaderNodeSubsurfaceScattering")
+def subsurface(b, weight):
+    b.warn("subsurface scattering is not rendered yet; it is diffuse of the same albedo")
+    b.op("diffuse", weight, b.input("Color"), 0.0, normal(b))
+
+
+@closure_rule("ShaderNodeBsdfHair")
+def hair(b, weight):
+    op = "translucent" if b.node.component == "Transmission" else "diffuse"
+    b.warn(f"hair scattering is not rendered yet; it is {op} of the same colour")
+    inputs = (b.input("Color"), NONE) if op == "translucent" else (b.input("Color"), 0.0, NONE)
+    b.op(op, weight, *inputs)
+
+
+@closure_rule("ShaderNodeBsdfHairPrincipled")
+def principled_hair(b, weight):
+    b.warn("hair scattering is not rendered yet; it is diffuse of the hair's colour")
+    color = b.input("Color") if b.node.parametrization == "COLOR" else b.constant(0.3, 0.2, 0.1, kind=COLOR)
+    b.op("diffuse", weight, color, 0.0, NONE)
+
+
+@closure_rule("ShaderNodeBsdfRayPortal")
+def ray_portal(b, weight):
+    b.warn("ray portals are not rendered yet; light goes straight on")
+    b.op("transparent", weight, b.input("Color"))
+
+
+@closure_rule("ShaderNodeEeveeSpecular")
+def eevee_specular(b, weight):
+    b.warn("is a node for EEVEE alone; it renders black, as in Cycles")
+
+
+@closure_rule("ShaderNodeVolumeAbsorption", "ShaderNodeVolumeScatter", "ShaderNodeVolumePrincipled", "ShaderNodeVolumeCoefficients")
+def volume(b, weight):
+    b.warn("volumes are not rendered yet; on a surface it renders black, as in Cycles")
+
+
