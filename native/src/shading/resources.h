@@ -1,5 +1,6 @@
 // What ops may read besides the shading point: the images of the scene, and the scene itself for attributes.
 #pragma once
+#include <memory>
 
 namespace gi {
 
@@ -7,7 +8,7 @@ class Scene;
 class ImageSet;
 
 struct ShaderResources {
-  const ImageSet* images = nullptr;
+  std::shared_ptr<const ImageSet> images;
   const Scene* scene = nullptr;  // set by Scene
 };
 

@@ -1,0 +1,152 @@
+// Texel lookups. Interpolation works on what the file holds (encoded bytes, colour times alpha); decoding comes last.
+#include "shading/images.h"
+
+#include <array>
+
+#include "core/check.h"
+
+namespace gi {
+namespace {
+
+struct Rgba {
+  float v[4] = {0, 0, 0, 0};
+};
+Rgba operator*(float s, Rgba a) {
+  for (float& x : a.v) x *= s;
+  return a;
+}
+Rgba& operator+=(Rgba& a, Rgba b) {
+  for (int i = 0; i < 4; ++i) a.v[i] += b.v[i];
+  return a;
+}
+
+// Decoding by a table fine enough that linear interpolation in it errs by less than 1e-6.
+float srgb_to_linear(float x) {
+  constexpr int kSize = 2048;
+  static const auto table = [] {
+    std::array<float, kSize + 2> t;
+    for (int i = 0; i < kSize + 2; ++i) {
+      const double e = double(i) / kSize;
+      t[size_t(i)] = float(e <= 0.04045 ? e / 12.92 : std::pow((e + 0.055) / 1.055, 2.4));
+    }
+    return t;
+  }();
+  const float position = clamp01(x) * float(kSize);
+  const int i = int(position);
+  return lerp(table[size_t(i)], table[size_t(i) + 1], position - float(i));
+}
+
+Rgba texel(const ImageTile& t, int x, int y) {
+  const size_t at = 4 * (size_t(y) * size_t(t.width) + size_t(x));
+  Rgba c;
+  if (t.bytes) {
+    for (int i = 0; i < 4; ++i) c.v[i] = float(t.bytes[at + size_t(i)]) * (1.0f / 255.0f);
+  } else {
+    for (int i = 0; i < 4; ++i) c.v[i] = t.floats[at + size_t(i)];
+  }
+  if (t.alpha == AlphaMode::kNone) c.v[3] = 1.0f;
+  if (t.alpha == AlphaMode::kStraight && c.v[3] != 1.0f) {
+    for (int i = 0; i < 3; ++i) c.v[i] *= c.v[3];
+  }
+  return c;
+}
+
+// Index of texel x of n after extension; -1 is outside a clipped image.
+int extend(int x, int n, Extension e) {
+  switch (e) {
+    case Extension::kRepeat: {
+      const int r = x % n;
+      return r < 0 ? r + n : r;
+    }
+    case Extension::kExtend: return std::clamp(x, 0, n - 1);
+    case Extension::kMirror: {
+      const int m = (x < 0 ? -1 - x : x) % (2 * n);
+      return m < n ? m : 2 * n - 1 - m;
+    }
+    case Extension::kClip: return x < 0 || x >= n ? -1 : x;
+  }
+  return -1;
+}
+
+// Uniform cubic B-spline: smooth, does not pass through the texels.
+void cubic_weights(float t, float w[4]) {
+  const float s = 1.0f - t;
+  w[0] = s * s * s / 6.0f;
+  w[1] = ((0.5f * t - 1.0f) * t) * t + 2.0f / 3.0f;
+  w[2] = ((0.5f * s - 1.0f) * s) * s + 2.0f / 3.0f;
+  w[3] = t * t * t / 6.0f;
+}
+
+// The texels that an interpolation needs along one axis, and their weights.
+struct Taps {
+  int count = 1;
+  int index[4];
+  float weight[4] = {1, 0, 0, 0};
+
+  Taps(float x, int n, Interpolation interpolation, Extension extension) {
+    // Far-away and NaN coordinates would overflow integers; nothing sensible is out there.
+    if (!(std::abs(x) < 1e9f)) x = 0;
+    const float centred = interpolation == Interpolation::kClosest ? x : x - 0.5f;
+    const float floor = std::floor(centred), t = centred - floor;
+    int first = int(floor);
+    if (interpolation == Interpolation::kLinear) count = 2, weight[0] = 1.0f - t, weight[1] = t;
+    if (interpolation == Interpolation::kCubic) count = 4, first -= 1, cubic_weights(t, weight);
+    for (int i = 0; i < count; ++i) index[i] = extend(first + i, n, extension);
+  }
+};
+
+Rgba interpolate(const ImageTile& t, Vec2 uv, Interpolation interpolation, Extension extension) {
+  const Taps column(uv.x * float(t.width), t.width, interpolation, extension);
+  const Taps row(uv.y * float(t.height), t.height, interpolation, extension);
+  Rgba sum;
+  for (int j = 0; j < row.count; ++j) {
+    if (row.index[j] < 0) continue;
+    for (int i = 0; i < column.count; ++i)
+      if (column.index[i] >= 0) sum += (row.weight[j] * column.weight[i]) * texel(t, column.index[i], row.index[j]);
+  }
+  return sum;
+}
+
+// The tile under `uv`, which becomes relative to it. Null where there is none.
+const ImageTile* find_tile(const Image& image, Vec2& uv) {
+  if (!image.tiled) return &image.tiles.front();
+  if (!(uv.x >= 0.0f && uv.x < 10.0f && uv.y >= 0.0f && uv.y < 1000.0f)) return nullptr;
+  const int column = int(uv.x), row = int(uv.y), number = 1001 + 10 * row + column;
+  for (const ImageTile& tile : image.tiles) {
+    if (tile.number != number) continue;
+    uv = {uv.x - float(column), uv.y - float(row)};
+    return &tile;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+ImageSet::ImageSet(std::vector<Image> images) : images_(std::move(images)) {
+  for (const Image& image : images_) {
+    require(!image.tiles.empty(), "image '" + image.name + "' has no pixels");
+    for (const ImageTile& t : image.tiles)
+      require(t.width > 0 && t.height > 0 && (t.bytes || t.floats), "image '" + image.name + "' has a tile without pixels");
+  }
+}
+
+Texel ImageSet::lookup(int index, Vec2 uv, Interpolation interpolation, Extension extension, bool unassociate) const {
+  const ImageTile* tile = find_tile(images_[size_t(index)], uv);
+  if (!tile) return {Rgb(kMissingColor[0], kMissingColor[1], kMissingColor[2]), kMissingColor[3]};
+  Rgba c = interpolate(*tile, uv, interpolation, extension);
+  const float alpha = c.v[3];
+  const bool associated = tile->alpha == AlphaMode::kStraight || tile->alpha == AlphaMode::kPremultiplied;
+  if (unassociate && associated && alpha != 1.0f && alpha != 0.0f) c = (1.0f / alpha) * c;
+  if (tile->bytes && tile->srgb)
+    for (int i = 0; i < 3; ++i) c.v[i] = srgb_to_linear(c.v[i]);
+  return {Rgb(c.v[0], c.v[1], c.v[2]), alpha};
+}
+
+size_t ImageSet::memory_bytes() const {
+  size_t n = 0;
+  for (const Image& image : images_)
+    for (const ImageTile& t : image.tiles) n += t.byte_size();
+  return n;
+}
+
+}  // namespace gi

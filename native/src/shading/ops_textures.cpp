@@ -1,0 +1,134 @@
+// Texture ops: thin wrappers that read operands and call the textures in textures/. Enum immediates are listed with each op.
+#include "scene/scene.h"
+#include "shading/images.h"
+#include "shading/program.h"
+#include "shading/resources.h"
+#include "shading/textures/brick.h"
+#include "shading/textures/checker.h"
+#include "shading/textures/gradient.h"
+#include "shading/textures/magic.h"
+#include "shading/textures/noise.h"
+#include "shading/textures/projection.h"
+#include "shading/textures/wave.h"
+
+namespace gi {
+namespace {
+
+using namespace texture;
+
+// noise(value, colour; vector, w, scale, detail, roughness, lacunarity, offset, gain, distortion;
+//       dimensions, Fractal, normalize, colour wanted)
+void noise(const Operands& a, ShadeState&) {
+  FractalSettings s;
+  s.type = Fractal(a.imm(12)), s.normalize = a.imm(13) != 0;
+  s.detail = std::clamp(a.f(5), 0.0f, 15.0f), s.roughness = std::max(a.f(6), 0.0f);
+  s.lacunarity = a.f(7), s.offset = a.f(8), s.gain = a.f(9);
+  const float scale = a.f(4);
+  with_dimensions(a.imm(11), [&]<int N>() {
+    const Rgb c = noise_texture(coordinates<N>(a.v(2), a.f(3)) * scale, s, a.f(10), a.imm(14) != 0);
+    a.set(0, c.r), a.set(1, c);
+  });
+}
+
+// white_noise(value, colour; vector, w; dimensions)
+void white_noise(const Operands& a, ShadeState&) {
+  with_dimensions(a.imm(4), [&]<int N>() {
+    const Point<N> p = coordinates<N>(a.v(2), a.f(3));
+    a.set(0, hash_value(p)), a.set(1, hash_rgb(p));
+  });
+}
+
+// checker(colour, value; vector, colour 1, colour 2, scale)
+void checker_texture(const Operands& a, ShadeState&) {
+  const float value = checker(a.v(2) * a.f(5));
+  const Vec3 color = a.v(value == 1.0f ? 3 : 4);
+  a.set(0, color), a.set(1, value);
+}
+
+// gradient(value; vector; Gradient)
+void gradient_texture(const Operands& a, ShadeState&) { a.set(0, gradient(a.v(1), Gradient(a.imm(2)))); }
+
+// brick(colour, mortar; vector, colour 1, colour 2, mortar colour, scale, mortar size, mortar smooth, bias, width, row height,
+//       offset, squash; offset frequency, squash frequency)
+void brick_texture(const Operands& a, ShadeState&) {
+  BrickSettings s;
+  s.mortar_size = a.f(7), s.mortar_smooth = a.f(8), s.bias = a.f(9), s.width = a.f(10), s.row_height = a.f(11);
+  s.offset = a.f(12), s.squash = a.f(13), s.offset_frequency = a.imm(14), s.squash_frequency = a.imm(15);
+  const Brick b = brick(a.v(2) * a.f(6), s);
+  const Rgb color = lerp(lerp(a.c(3), a.c(4), b.tint), a.c(5), b.mortar);
+  a.set(0, color), a.set(1, b.mortar);
+}
+
+// wave(value; vector, scale, distortion, detail, detail scale, detail roughness, phase; Wave, WaveDirection, WaveProfile)
+void wave_texture(const Operands& a, ShadeState&) {
+  WaveSettings s;
+  s.distortion = a.f(3), s.detail = a.f(4), s.detail_scale = a.f(5), s.detail_roughness = a.f(6), s.phase = a.f(7);
+  s.type = Wave(a.imm(8)), s.direction = WaveDirection(a.imm(9)), s.profile = WaveProfile(a.imm(10));
+  a.set(0, wave(a.v(1) * a.f(2), s));
+}
+
+// magic(colour, value; vector, scale, distortion; depth)
+void magic_texture(const Operands& a, ShadeState&) {
+  const Rgb color = magic(a.v(2), a.f(3), a.imm(5), a.f(4));
+  a.set(0, color), a.set(1, average(color));
+}
+
+enum class Projection { kFlat, kSphere, kTube };
+enum class EnvironmentProjection { kEquirectangular, kMirrorBall };
+
+void set_texel(const Operands& a, const Texel& t) { a.set(0, t.color), a.set(1, t.alpha); }
+
+// image(colour, alpha; vector; image, Projection, Interpolation, Extension, unassociate)
+void image_texture(const Operands& a, ShadeState& s) {
+  const Vec3 p = a.v(2);
+  Vec2 uv{p.x, p.y};
+  if (Projection(a.imm(4)) == Projection::kSphere) uv = project_to_sphere(p);
+  if (Projection(a.imm(4)) == Projection::kTube) uv = project_to_tube(p);
+  set_texel(a, s.resources.images->lookup(a.imm(3), uv, Interpolation(a.imm(5)), Extension(a.imm(6)), a.imm(7) != 0));
+}
+
+// The shading normal in the object's own space, as Box projection needs it.
+Vec3 object_normal(const ShadeState& s) {
+  if (s.point.instance == kNoId || !s.resources.scene) return s.point.ns;
+  return normalize(s.resources.scene->instances()[s.point.instance].to_world.transposed_vector(s.point.ns));
+}
+
+// image_box(colour, alpha; vector, blend; image, Interpolation, Extension, unassociate)
+void image_box_texture(const Operands& a, ShadeState& s) {
+  const Vec3 p = a.v(2), n = object_normal(s), weights = box_weights(n, a.f(3));
+  // No side shows the image mirrored.
+  const Vec2 uv[3] = {{n.x < 0.0f ? 1.0f - p.y : p.y, p.z}, {n.y > 0.0f ? 1.0f - p.x : p.x, p.z}, {n.z > 0.0f ? 1.0f - p.y : p.y, p.x}};
+  Texel sum{Rgb(), 0};
+  for (int i = 0; i < 3; ++i) {
+    if (weights[i] <= 0.0f) continue;
+    const Texel t = s.resources.images->lookup(a.imm(4), uv[i], Interpolation(a.imm(5)), Extension(a.imm(6)), a.imm(7) != 0);
+    sum.color += weights[i] * t.color, sum.alpha += weights[i] * t.alpha;
+  }
+  set_texel(a, sum);
+}
+
+// environment(colour, alpha; direction; image, EnvironmentProjection, Interpolation)
+void environment_texture(const Operands& a, ShadeState& s) {
+  const bool ball = EnvironmentProjection(a.imm(4)) == EnvironmentProjection::kMirrorBall;
+  const Vec2 uv = ball ? direction_to_mirror_ball(a.v(2)) : direction_to_equirectangular(a.v(2));
+  set_texel(a, s.resources.images->lookup(a.imm(3), uv, Interpolation(a.imm(5)), Extension::kRepeat, false));
+}
+
+constexpr Op kTextureOps[] = {
+    {"noise", "fv", "vffffffff", 4, OpKind::kPure, noise},
+    {"white_noise", "fv", "vf", 1, OpKind::kPure, white_noise},
+    {"checker", "vf", "vvvf", 0, OpKind::kPure, checker_texture},
+    {"gradient", "f", "v", 1, OpKind::kPure, gradient_texture},
+    {"brick", "vf", "vvvvffffffff", 2, OpKind::kPure, brick_texture},
+    {"wave", "f", "vffffff", 3, OpKind::kPure, wave_texture},
+    {"magic", "vf", "vff", 1, OpKind::kPure, magic_texture},
+    {"image", "vf", "v", 5, OpKind::kContext, image_texture},
+    {"image_box", "vf", "vf", 4, OpKind::kContext, image_box_texture},
+    {"environment", "vf", "v", 3, OpKind::kContext, environment_texture},
+};
+
+}  // namespace
+
+std::span<const Op> texture_ops() { return kTextureOps; }
+
+}  // namespace gi
