@@ -131,7 +131,7 @@ ImageSet::ImageSet(std::vector<Image> images) : images_(std::move(images)) {
 }
 
 Texel ImageSet::lookup(int index, Vec2 uv, Interpolation interpolation, Extension extension, bool unassociate) const {
-  const ImageTile* tile = find_tile(images_[size_t(index)], uv);
+  const ImageTile* tile = size_t(index) < images_.size() ? find_tile(images_[size_t(index)], uv) : nullptr;
   if (!tile) return {Rgb(kMissingColor[0], kMissingColor[1], kMissingColor[2]), kMissingColor[3]};
   Rgba c = interpolate(*tile, uv, interpolation, extension);
   const float alpha = c.v[3];

@@ -6,6 +6,8 @@
 
 namespace gi::texture {
 
+using gi::lerp;  // beside the one for points
+
 template <int N>
 struct Point {
   float v[N] = {};
