@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 
 from ..scene_data import Scene
-from .mesh import UNDEFORMED
 from .warnings import Warnings
 
 
