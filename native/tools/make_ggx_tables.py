@@ -55,9 +55,13 @@ class View:
         return np.where(self.reflected_z > 0, self.shadowing(self.reflected_z), 0)
 
     def glass(self, eta):
+        """Light bent out of the surface on the wrong side is counted as kept, as Blender does: from inside and at grazing angles it is
+        most of all, and what is left would be scaled up without bound."""
+        if abs(eta - 1) < 1e-4:
+            return np.ones_like(self.mu)
         f, t = fresnel(self.c, eta)
         z = (self.c / eta - t) * self.hz - self.mu / eta
-        return f * self.reflection() + (1 - f) * np.where(z < 0, self.shadowing(-z), 0)
+        return f * self.reflection() + (1 - f) * self.shadowing(np.abs(z))
 
     def weight(self, curve):
         return np.where(self.reflected_z > 0, curve(self.c), 0)

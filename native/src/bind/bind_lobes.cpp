@@ -1,5 +1,5 @@
 // One lobe at a time for the tests: made by name and parameters, then evaluated and sampled over arrays of directions.
-// Leaves out mixing (Bsdf) and frames: directions are local, z the normal.
+// Directions are local, z the normal; those of whole mixes (Bsdf) are in the world.
 #include "bind/bind.h"
 
 #include <nanobind/nanobind.h>
@@ -12,6 +12,7 @@
 #include <map>
 
 #include "core/check.h"
+#include "shading/bsdf.h"
 #include "shading/lobes/lobes.h"
 
 namespace nb = nanobind;
@@ -57,7 +58,8 @@ Microfacet<D> make_microfacet(const std::string& side, const Parameters& p) {
                        : side == "refraction" ? Microfacet<D>::refraction(alpha, fresnel)
                                               : Microfacet<D>::glass(alpha, fresnel);
   const float cos_o = p.f("preserve_energy_at", -1.0f);
-  if (cos_o >= 0.0f) lobe.preserve_energy(cos_o, p.c("mean", fresnel.mean()));
+  if (cos_o >= 0.0f && p.values.contains("mean")) lobe.preserve_energy(cos_o, p.c("mean", Rgb(1.0f)));
+  else if (cos_o >= 0.0f) lobe.preserve_energy(cos_o);
   return lobe;
 }
 
@@ -127,12 +129,61 @@ Output lobe_albedo(const std::string& name, const Values& values, Input wo) {
   return out;
 }
 
+// A mix of lobes: each of name, parameters, weight and normal, as rows of equal length.
+struct Mix {
+  Bsdf bsdf;
+  void begin(std::vector<float> ng, std::vector<float> ns, std::vector<float> transparency) {
+    bsdf.clear(vec(ng), vec(ns));
+    bsdf.transparency = Rgb(vec(transparency));
+  }
+  void add(const std::string& name, const Values& values, std::vector<float> weight, std::vector<float> normal) {
+    bsdf.add(Rgb(vec(weight)), make_lobe(name, {values}), Frame::from_normal(vec(normal)));
+  }
+  // Columns as lobe_eval and lobe_sample; a single wo.
+  Output eval(std::vector<float> wo, Input wi, int flags) {
+    bsdf.finish(vec(wo));
+    float* data;
+    Output out = make_output(wi.shape(0), 4, &data);
+    for (size_t i = 0; i < wi.shape(0); ++i) {
+      const LobeEval e = flags ? bsdf.eval(vec(wo), row_of(wi, i), uint8_t(flags)) : bsdf.eval(vec(wo), row_of(wi, i));
+      store(data + 4 * i, e.value), data[4 * i + 3] = e.pdf_dir;
+    }
+    return out;
+  }
+  Output sample(std::vector<float> wo, Input u) {
+    bsdf.finish(vec(wo));
+    float* data;
+    Output out = make_output(u.shape(0), 9, &data);
+    for (size_t i = 0; i < u.shape(0); ++i) {
+      const Vec3 r = row_of(u, i);
+      const auto s = bsdf.sample(vec(wo), {r.x, r.y}, r.z);
+      if (!s) continue;
+      float* row = data + 9 * i;
+      store(row, {s->wi.x, s->wi.y, s->wi.z}), store(row + 3, s->value);
+      row[6] = s->pdf_dir, row[7] = s->flags, row[8] = s->roughness;
+    }
+    return out;
+  }
+  std::vector<float> albedo(std::vector<float> wo) {
+    const Rgb a = bsdf.albedo(vec(wo));
+    return {a.r, a.g, a.b};
+  }
+  static Vec3 vec(const std::vector<float>& v) { return {v.at(0), v.at(1), v.at(2)}; }
+};
+
 }  // namespace
 
 void bind_lobes(nb::module_& m) {
   m.def("lobe_eval", &lobe_eval);
   m.def("lobe_sample", &lobe_sample);
   m.def("lobe_albedo", &lobe_albedo);
+  nb::class_<Mix>(m, "TestBsdf")
+      .def(nb::init<>())
+      .def("begin", &Mix::begin)
+      .def("add", &Mix::add)
+      .def("eval", &Mix::eval, nb::arg("wo"), nb::arg("wi"), nb::arg("flags") = 0)
+      .def("sample", &Mix::sample)
+      .def("albedo", &Mix::albedo);
 }
 
 }  // namespace gi::bind

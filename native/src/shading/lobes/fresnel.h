@@ -111,9 +111,8 @@ inline FresnelTerms Fresnel::operator()(float cos_h) const {
 inline Rgb Fresnel::mean() const {
   switch (model) {
     case Model::kNone: return Rgb(1.0f);
-    case Model::kDielectric: return Rgb(fresnel_dielectric_mean(ior));
+    case Model::kDielectric: return reflection_tint * fresnel_dielectric_mean(ior);
     case Model::kSchlick: {
-      if (!is_black(transmission_tint)) return transmission_tint;  // Blender's choice: the tint decides the colour of glass
       const float lowest = f0_from_ior(ior);
       const float s = exponent < 0.0f ? clamp01((fresnel_dielectric_mean(ior) - lowest) / (1.0f - lowest))
                                       : 2.0f / ((exponent + 3.0f) * exponent + 2.0f);

@@ -28,7 +28,8 @@ struct Microfacet {
   // Puts back the energy of the bounces between facets, for a view at cos_o. `mean` is the mean reflectance that each further
   // bounce is tinted by. GGX only; reflection or glass. [Kulla & Conty 2017; Turquin 2019, "Practical multiple scattering"]
   void preserve_energy(float cos_o, Rgb mean);
-  void preserve_energy(float cos_o) { preserve_energy(cos_o, fresnel.mean()); }
+  // The tint decides the colour of glass, as in Blender.
+  void preserve_energy(float cos_o) { preserve_energy(cos_o, transmits() ? fresnel.transmission_tint : fresnel.mean()); }
 
   // Takes one side away, and its energy with it (Blender's caustics switches).
   void remove(uint8_t side) {
