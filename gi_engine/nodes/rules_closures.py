@@ -32,11 +32,13 @@ def normal(b, name: str = "Normal"):
 
 
 def tangent(b, anisotropy: Value):
-    """The Tangent socket; only looked up where the surface is anisotropic. Not linked: around the object's z axis."""
+    """The Tangent socket; only looked up where the surface is anisotropic."""
     n = number(b, anisotropy)
     if n is not None and abs(n) <= 1e-4:
         return NONE
-    return b.linked_or("Tangent", b.op("default_tangent"))
+    if not b.linked("Tangent"):
+        b.warn("anisotropy needs a Tangent that is linked; it is isotropic")
+    return b.linked_or("Tangent", NONE)
 
 
 def film(b):

@@ -5,8 +5,6 @@
 
 namespace gi {
 
-std::span<const Op> closure_ops();
-
 // Adds a lobe about normal `n`, with `tangent` as the frame's x axis unless it is zero.
 inline void add_lobe(ShadeState& s, Rgb weight, const Lobe& lobe, Vec3 n, Vec3 tangent = {0, 0, 0}) {
   s.bsdf->add(weight, lobe, Frame::from_normal_and_tangent(n, tangent));

@@ -1,7 +1,7 @@
 // Ops that end a node tree: each adds lobes, emission, transparency or holdout to state.bsdf. The first input is always the
 // weight that Mix Shader leaves. A zero vector for a normal or a tangent means "not linked". Leaves out volumes and hair.
-#include "scene/scene.h"
 #include "shading/closures.h"
+#include "shading/ops.h"
 #include "shading/principled.h"
 
 namespace gi {
@@ -10,17 +10,6 @@ namespace {
 void mix_weights(const Operands& o, ShadeState&) {
   const float w = o.f(2), second = clamp01(o.f(3));
   o.set(0, w * (1.0f - second)), o.set(1, w * second);
-}
-
-// Tangents where none is linked: around the z axis of the object's generated coordinates.
-void default_tangent(const Operands& o, ShadeState& s) {
-  const ShadingPoint& p = s.point;
-  if (!s.resources.scene || p.instance == kNoId) return o.set(0, Vec3{});
-  const Instance& instance = s.resources.scene->instances()[p.instance];
-  const MeshData& mesh = s.resources.scene->mesh(instance.mesh);
-  const Vec3 c = p.object_position - mesh.texture_location, size = mesh.texture_size;
-  const Vec3 around = instance.to_object.transposed_vector({-safe_divide(c.y, size.y), safe_divide(c.x, size.x), 0});
-  o.set(0, cross(p.ns, normalize(cross(around, p.ns))));
 }
 
 void emission(const Operands& o, ShadeState& s) {
@@ -176,7 +165,6 @@ void principled_emission(const Operands& o, ShadeState& s) {
 // The second strings of the last two are what read_top reads.
 const Op kOps[] = {
     {"mix_weights", "ff", "ff", 0, OpKind::kPure, mix_weights},
-    {"default_tangent", "v", "", 0, OpKind::kContext, default_tangent},
     {"emission", "", "fvf", 0, OpKind::kClosure, emission, kAddsEmission},
     {"transparent", "", "fv", 0, OpKind::kClosure, transparent, kAddsTransparency},
     {"alpha", "", "ff", 0, OpKind::kClosure, alpha, kAddsTransparency},
