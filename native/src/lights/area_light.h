@@ -31,7 +31,7 @@ struct AreaLight {
   float intensity() const { return scale * area() * (slats ? std::min(tan_spread * slats_norm, 1e4f) : 1.0f); }
 
   // Radiance towards −wi per unit of colour.
-  float radiance(Vec3 wi) const {
+  float radiance(Vec3, Vec3 wi) const {
     const float c = -dot(wi, normal);
     if (!(c > 0.0f)) return 0.0f;
     if (!slats) return scale;
@@ -49,7 +49,7 @@ struct AreaLight {
     const float distance = length(to);
     if (!(distance > 0.0f) || !contains(p)) return std::nullopt;
     const Vec3 wi = to / distance;
-    const float l = radiance(wi);
+    const float l = radiance(query.position, wi);
     if (l == 0.0f) return std::nullopt;
     return ShapeSample{wi, distance, l, pdf(part, query.position, wi, distance), false};
   }
@@ -62,12 +62,11 @@ struct AreaLight {
     return t;
   }
 
-  ShapeEval eval(const LightQuery& query, Vec3 wi) const {
+  float pdf_dir(const LightQuery& query, Vec3 wi) const {
     const float height = dot(query.position - center, normal), c = -dot(wi, normal);
-    if (!(height > 0.0f) || !(c > 0.0f)) return {};
+    if (!(height > 0.0f) || !(c > 0.0f)) return 0.0f;
     const Part part = reachable(query.position, height);
-    const float pdf_dir = part.shape == Part::kNothing ? 0.0f : pdf(part, query.position, wi, height / c);
-    return {radiance(wi), pdf_dir};
+    return part.shape == Part::kNothing ? 0.0f : pdf(part, query.position, wi, height / c);
   }
 
   Vec2 coordinates(Vec3 p) const {  // −½ … ½ over the sides

@@ -16,11 +16,6 @@ struct ShapeSample {
   bool is_delta = false;
 };
 
-// The same for a ray that met the light by itself.
-struct ShapeEval {
-  float scale = 0, pdf_dir = 0;
-};
-
 // Uniform over the cone about +z, by the concentric map: (½, ½) is its axis.
 inline Vec3 sample_cone_concentric(Vec2 u, float one_minus_cos) {
   const Vec2 d = sample_disk(u);

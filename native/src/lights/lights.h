@@ -8,7 +8,7 @@
 
 namespace gi {
 
-// Where light is wanted.
+// Where light is wanted. Node programs of lights see the ray kind 0, as Cycles has it for sampled light.
 struct LightQuery {
   Vec3 position;
   Vec3 normal;                // shading normal; zero where there is none (volumes)
@@ -40,7 +40,7 @@ struct LampHit {
 
 class LightSet {
  public:
-  explicit LightSet(const Scene& scene);
+  explicit LightSet(const Scene& scene, int threads = 0);  // threads for building; 0: one for each core
   ~LightSet();
 
   // Picks a light by its estimated contribution and a direction towards it.
@@ -52,8 +52,10 @@ class LightSet {
   uint32_t count() const;  // lamps, emissive triangles, the world
   bool empty() const { return count() == 0; }
 
-  // Lamps are transparent: the nearest lamp with a shape that a ray of `visibility` meets in (t_min, t_max).
-  std::optional<LampHit> intersect_lamp(const Ray& ray, uint32_t visibility) const;
+  // Lamps are transparent: the nearest lamp with a shape that a ray of `visibility` meets in (t_min, t_max), or the next
+  // one behind `after`. Lamps without multiple importance sampling are found by camera rays alone.
+  std::optional<LampHit> intersect_lamp(const Ray& ray, uint32_t visibility, const LampHit* after = nullptr) const;
+  // `from` is where the ray left a surface; for its density alone.
   LightEval eval_lamp(const LightQuery& from, const Ray& ray, const LampHit& hit) const;
   // Suns of a visible size, seen along a ray that leaves the scene: one call per sun.
   uint32_t sun_count() const;
@@ -62,10 +64,13 @@ class LightSet {
   float pdf_triangle(const LightQuery& from, const ShadingPoint& point, float t) const;
   // Density with which `sample` picks `direction` on the world.
   float pdf_world(const LightQuery& from, Vec3 direction) const;
+  // Probability with which `sample` picks the light.
+  float pick_probability(const LightQuery& query, uint32_t light) const;
+  std::string description() const;  // how many of what
 
  private:
   struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<const Impl> impl_;
 };
 
 }  // namespace gi

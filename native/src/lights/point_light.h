@@ -51,12 +51,14 @@ struct PointLight {
     return along - std::copysign(std::sqrt(r2 - off2), d2 - r2);
   }
 
-  ShapeEval eval(const LightQuery& query, Vec3 wi) const {
+  // Radiance towards −wi at `position` per unit of colour, and the density of `sample`, on a line that meets the lamp.
+  float radiance(Vec3, Vec3) const { return scale; }
+  float pdf_dir(const LightQuery& query, Vec3 wi) const {
     const Vec3 to = center - query.position;
     const float d2 = length_squared(to);
-    if (sphere) return {scale, d2 > sqr(radius) ? pdf_cone(d2) : pdf_around(query, wi)};
+    if (sphere) return d2 > sqr(radius) ? pdf_cone(d2) : pdf_around(query, wi);
     const float along = dot(to, wi);
-    return along > 0.0f ? ShapeEval{scale, pdf_disk(d2 / along, std::sqrt(d2))} : ShapeEval{};
+    return along > 0.0f ? pdf_disk(d2 / along, std::sqrt(d2)) : 0.0f;
   }
 
   float one_minus_cos(float d2) const { return one_minus_cos_from_sin2(sqr(radius) / d2); }

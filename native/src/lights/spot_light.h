@@ -51,22 +51,23 @@ struct SpotLight {
     return point.intersect(ray);
   }
 
-  ShapeEval eval(const LightQuery& query, Vec3 wi) const {
-    ShapeEval e = point.eval(query, wi);
-    const float d2 = length_squared(point.center - query.position);
-    if (samples_cone(d2)) e.pdf_dir = 1.0f / (2.0f * kPi * one_minus_cos_world);
-    if (!point.sphere || d2 > sqr(point.radius)) e.scale *= attenuation(wi);
-    return e;
+  float radiance(Vec3 position, Vec3 wi) const {
+    const bool inside = point.sphere && length_squared(point.center - position) <= sqr(point.radius);
+    return point.scale * (inside ? 1.0f : attenuation(wi));
+  }
+  float pdf_dir(const LightQuery& query, Vec3 wi) const {
+    return samples_cone(length_squared(point.center - query.position)) ? pdf_shine() : point.pdf_dir(query, wi);
   }
 
  private:
   // Close to a large sphere the cone of the shine is narrower than the sphere looks.
   bool samples_cone(float d2) const { return point.sphere && d2 > sqr(point.radius) && one_minus_cos_world < point.one_minus_cos(d2); }
+  float pdf_shine() const { return 1.0f / (2.0f * kPi * one_minus_cos_world); }
   std::optional<ShapeSample> sample_shine(const LightQuery& query, Vec2 u) const {
     const Vec3 wi = Frame::from_normal(-axis).to_world(sample_cone_concentric(u, one_minus_cos_world));
     const auto t = point.intersect({query.position, wi});
     if (!t) return std::nullopt;
-    return ShapeSample{wi, *t, point.scale, 1.0f / (2.0f * kPi * one_minus_cos_world), false};
+    return ShapeSample{wi, *t, point.scale, pdf_shine(), false};
   }
 };
 

@@ -26,13 +26,10 @@ struct SunLight {
     const Vec3 wi = normalize(Frame::from_normal(direction).to_world(sample_cone_concentric(u, one_minus_cos)));
     return ShapeSample{wi, kInf, scale, pdf_dir(), false};
   }
-  ShapeEval eval(Vec3 wi) const {
+  bool shows(Vec3 wi) const {
     // 1 − cos θ = |a − b|²/2 keeps its digits for the half degree of the real sun.
-    const bool inside = has_shape() && 0.5f * length_squared(wi - direction) <= one_minus_cos;
-    return inside ? ShapeEval{scale, pdf_dir()} : ShapeEval{};
+    return has_shape() && 0.5f * length_squared(wi - direction) <= one_minus_cos;
   }
-
- private:
   float pdf_dir() const { return 1.0f / (2.0f * kPi * one_minus_cos); }
 };
 

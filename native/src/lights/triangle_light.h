@@ -71,14 +71,11 @@ struct TriangleLight {
     const Vec3 n_ab = normalize(cross(k.a, k.b)), n_ca = normalize(cross(k.c, k.a));
     if (n_ab == Vec3{0, 0, 0} || n_ca == Vec3{0, 0, 0}) return sample_failed(k, position);
     const float cos_alpha = std::clamp(-dot(n_ab, n_ca), -1.0f, 1.0f), sin_alpha = length(cross(n_ab, n_ca));
-    // tan of the cut triangle's dihedral angle follows from its area: with φ = area − α, the cut point c' on arc ac has
-    // cos b' below.
     const float area = u.x * k.solid_angle;
     const float s = std::sin(area) * cos_alpha - std::cos(area) * sin_alpha;  // sin(area − α)
     const float t = std::cos(area) * cos_alpha + std::sin(area) * sin_alpha;  // cos(area − α)
     const float p = t - cos_alpha, q = s + sin_alpha * dot(k.a, k.b);
-    const float denominator = (s * p + t * q) * sin_alpha;
-    float cos_b = denominator != 0.0f ? ((t * q - s * p) * cos_alpha - q) / ((s * q + t * p) * sin_alpha) : 1.0f;
+    float cos_b = ((t * q - s * p) * cos_alpha - q) / ((s * q + t * p) * sin_alpha);
     if (!std::isfinite(cos_b)) cos_b = 1.0f;
     cos_b = std::clamp(cos_b, -1.0f, 1.0f);
     const Vec3 c_cut = k.a * cos_b + normalize(k.c - k.a * dot(k.c, k.a)) * safe_sqrt(1.0f - cos_b * cos_b);

@@ -1,0 +1,385 @@
+// The lights of a scene: gathered, bounded, put into the light tree; choice, sampling and densities dispatch from here.
+#include "lights/lights.h"
+
+#include <algorithm>
+#include <atomic>
+#include <thread>
+#include <variant>
+
+#include "core/parallel.h"
+#include "lights/area_light.h"
+#include "lights/lamp_bvh.h"
+#include "lights/light_tree.h"
+#include "lights/spot_light.h"
+#include "lights/sun_light.h"
+#include "lights/triangle_light.h"
+#include "lights/triangle_power.h"
+#include "lights/world_light.h"
+
+namespace gi {
+
+namespace {
+
+using Shape = std::variant<PointLight, SpotLight, AreaLight, SunLight>;
+
+struct Lamp {
+  Shape shape;
+  const LampData* data;
+  Affine to_lamp;
+  bool findable;  // has a shape that rays can meet
+};
+
+Shape make_shape(const LampData& lamp) {
+  switch (lamp.kind) {
+    case LampKind::kSpot: return SpotLight(lamp);
+    case LampKind::kArea: return AreaLight(lamp);
+    case LampKind::kSun: return SunLight(lamp);
+    case LampKind::kPoint: break;
+  }
+  return PointLight(lamp);
+}
+
+float magnitude(Rgb c) { return luminance({std::abs(c.r), std::abs(c.g), std::abs(c.b)}); }
+
+void bound(const PointLight& light, LightBounds& b) {
+  const Vec3 r = Vec3{1, 1, 1} * light.radius;
+  b.lo = light.center - r, b.hi = light.center + r;
+  b.cos_normals = -1.0f, b.cos_emission = 0.0f, b.power = light.intensity();
+}
+void bound(const SpotLight& light, LightBounds& b) {
+  bound(light.point, b);
+  if (light.point.sphere) return;  // inside the sphere it shines everywhere
+  // The cone does not fall off before its edge: as a cone of normals it is bounded better than by its axis.
+  b.axis = light.axis, b.cos_normals = std::max(1.0f - light.one_minus_cos_world, -1.0f), b.cos_emission = 0.999f;
+  b.power = light.point.intensity();
+}
+void bound(const AreaLight& light, LightBounds& b) {
+  const Vec3 du = light.u * (0.5f * light.size_u), dv = light.v * (0.5f * light.size_v);
+  Bounds box;
+  for (int k = 0; k < 4; ++k) box.add(light.center + du * (k & 1 ? 1.0f : -1.0f) + dv * (k & 2 ? 1.0f : -1.0f));
+  b.lo = box.lo, b.hi = box.hi, b.axis = light.normal, b.power = light.intensity();
+  b.cos_emission = light.slats ? std::cos(std::atan(light.tan_spread)) : 0.0f;
+}
+void bound(const SunLight&, LightBounds&) {}
+
+float hardness(const Shape& shape) {  // what a lamp of colour 1 weighs: 0 leaves it out
+  return std::visit([](const auto& s) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(s)>, SunLight>) {
+      return s.irradiance();
+    } else {
+      LightBounds b;
+      bound(s, b);
+      return b.power;
+    }
+  }, shape);
+}
+
+PathState seen_by_light(PathState path, float distance) {
+  path.kind = 0, path.depth += 1, path.ray_length = distance;
+  return path;
+}
+
+}  // namespace
+
+struct LightSet::Impl {
+  const Scene& scene;
+  std::vector<Lamp> lamps;
+  std::vector<TriangleLight> triangles;
+  std::vector<Rgb> constant_emission;        // by material: what it emits, where that is the same everywhere
+  std::vector<uint8_t> emission_is_constant;
+  std::vector<std::vector<uint32_t>> triangle_light;  // by instance: light of each triangle, kNoId for none; empty: no light
+  WorldLight world;
+  LampBvh bvh;
+  LightTree tree;
+  std::vector<uint32_t> tree_light, tree_slot;  // light ↔ index in the tree
+  std::vector<uint32_t> suns;
+
+  uint32_t first_triangle() const { return uint32_t(lamps.size()); }
+  uint32_t world_light() const { return first_triangle() + uint32_t(triangles.size()); }
+  uint32_t count() const { return world_light() + (world.emits() ? 1u : 0u); }
+
+  Impl(const Scene& s, int threads) : scene(s) {
+    add_lamps();
+    std::vector<LightBounds> bounds;
+    for (uint32_t i = 0; i < lamps.size(); ++i) {
+      if (std::holds_alternative<SunLight>(lamps[i].shape)) continue;
+      LightBounds b;
+      std::visit([&](const auto& shape) { bound(shape, b); }, lamps[i].shape);
+      b.power *= magnitude(lamps[i].data->color);
+      bounds.push_back(b), tree_light.push_back(i);
+    }
+    add_triangles(threads, bounds);
+    tree_slot.assign(world_light(), kNoId);
+    for (uint32_t k = 0; k < tree_light.size(); ++k) tree_slot[tree_light[k]] = k;
+    tree = LightTree(bounds);
+    world = WorldLight(scene, threads);
+  }
+
+  void add_lamps() {
+    std::vector<LampBvh::Item> items;
+    for (const LampData& data : scene.data().lamps) {
+      if (!is_finite(data.color) || !(magnitude(data.color) > 0.0f)) continue;
+      Lamp lamp{make_shape(data), &data, data.matrix.inverse(), false};
+      const float weight = hardness(lamp.shape);
+      if (!(weight > 0.0f) || !std::isfinite(weight)) continue;
+      std::visit([&](const auto& shape) {
+        using S = std::decay_t<decltype(shape)>;
+        if constexpr (std::is_same_v<S, SunLight>) {
+          lamp.findable = shape.has_shape();
+          suns.push_back(uint32_t(lamps.size()));
+        } else {
+          if constexpr (std::is_same_v<S, SpotLight>) lamp.findable = shape.point.has_shape();
+          else lamp.findable = shape.has_shape();
+          LightBounds b;
+          bound(shape, b);
+          if (lamp.findable) items.push_back({b.box(), uint32_t(lamps.size())});
+        }
+      }, lamp.shape);
+      lamps.push_back(lamp);
+    }
+    bvh = LampBvh(std::move(items));
+  }
+
+  void add_triangles(int threads, std::vector<LightBounds>& bounds) {
+    TrianglePowers powers = measure_triangles(scene, threads);
+    constant_emission = std::move(powers.constant_emission);
+    emission_is_constant = std::move(powers.is_constant);
+    triangle_light.resize(scene.instances().size());
+    triangles.reserve(powers.lights.size());
+    for (const MeasuredTriangle& m : powers.lights) {
+      auto& table = triangle_light[m.light.instance];
+      if (table.empty()) table.assign(scene.mesh(scene.instances()[m.light.instance].mesh).triangle_count(), kNoId);
+      const uint32_t index = first_triangle() + uint32_t(triangles.size());
+      table[m.light.triangle] = index;
+      tree_light.push_back(index);
+      triangles.push_back(m.light);
+      LightBounds b;
+      Bounds box;
+      for (Vec3 p : {m.light.a, m.light.a + m.light.ab, m.light.a + m.light.ac}) box.add(p);
+      b.lo = box.lo, b.hi = box.hi;
+      b.axis = m.light.front ? m.light.normal() : -m.light.normal();
+      b.power = m.radiance * m.light.area();
+      b.two_sided = m.light.front && m.light.back;
+      bounds.push_back(b);
+    }
+  }
+
+  // ------------------------------------------------------------ choice
+
+  // The share of all samples that goes to lights without a place: by irradiance, but never less than a sixth of either
+  // kind, since neither knows what is in the way.
+  float local_share(const LightQuery& query, float far) const {
+    const float local = tree.importance(query);
+    if (!(local > 0.0f)) return 0.0f;
+    if (!(far > 0.0f)) return 1.0f;
+    constexpr float kLeast = 1.0f / 6.0f;
+    return kLeast + (1.0f - 2.0f * kLeast) * (local / (local + far));
+  }
+  float sun_weight(uint32_t k, const LightQuery& query) const {
+    const Lamp& lamp = lamps[suns[k]];
+    const SunLight& sun = std::get<SunLight>(lamp.shape);
+    float c = length_squared(query.normal) > 0.0f ? dot(query.normal, sun.direction) : 1.0f;
+    if (query.transmission) c = std::abs(c);
+    return sun.irradiance() * magnitude(lamp.data->color) * std::max(c, 0.02f);
+  }
+  float far_weight(const LightQuery& query) const {
+    float sum = world.emits() ? world.irradiance() : 0.0f;
+    for (uint32_t k = 0; k < suns.size(); ++k) sum += sun_weight(k, query);
+    return sum;
+  }
+
+  std::optional<LightTree::Pick> pick(const LightQuery& query, float u) const {
+    const float far = far_weight(query), local = local_share(query, far);
+    if (u < local) {
+      auto p = tree.sample(query, std::min(u / local, kOneMinusEpsilon));
+      if (!p) return std::nullopt;
+      return LightTree::Pick{tree_light[p->light], p->probability * local};
+    }
+    if (!(far > 0.0f)) return std::nullopt;
+    float x = (u - local) / (1.0f - local) * far;
+    uint32_t light = kNoId;
+    float weight = 0;
+    for (uint32_t k = 0; k < suns.size(); ++k) {
+      light = suns[k], weight = sun_weight(k, query);
+      if (x < weight) return LightTree::Pick{light, (1.0f - local) * weight / far};
+      x -= weight;
+    }
+    if (world.emits()) light = world_light(), weight = world.irradiance();
+    return LightTree::Pick{light, (1.0f - local) * weight / far};
+  }
+
+  float pick_probability(const LightQuery& query, uint32_t light) const {
+    const float far = far_weight(query), local = local_share(query, far);
+    if (light < tree_slot.size() && tree_slot[light] != kNoId) {
+      return local > 0.0f ? local * tree.probability(query, tree_slot[light]) : 0.0f;
+    }
+    if (!(far > 0.0f)) return 0.0f;
+    if (light == world_light()) return (1.0f - local) * world.irradiance() / far;
+    const auto k = std::find(suns.begin(), suns.end(), light);
+    return k == suns.end() ? 0.0f : (1.0f - local) * sun_weight(uint32_t(k - suns.begin()), query) / far;
+  }
+
+  // ------------------------------------------------------------ sampling
+
+  // What a lamp's node program makes of its light towards −wi; 1 without a program.
+  Rgb lamp_program(const Lamp& lamp, Vec3 origin, Vec3 wi, float distance, const PathState& path) const {
+    if (lamp.data->program < 0) return Rgb(1.0f);
+    ShadingPoint p;
+    p.wo = -wi;
+    p.position = std::isfinite(distance) ? origin + wi * distance : wi;
+    p.object_position = std::isfinite(distance) ? lamp.to_lamp.point(p.position) : lamp.to_lamp.vector(wi);
+    p.ng = p.ns = p.wo;
+    if (const auto* area = std::get_if<AreaLight>(&lamp.shape)) {
+      p.ng = p.ns = area->normal;
+      const Vec2 c = area->coordinates(p.position);
+      p.b1 = c.y + 0.5f, p.b2 = -c.x - c.y;  // Cycles' order, for the Parametric output
+    }
+    p.path = path;
+    return scene.run_emission(lamp.data->program, p);
+  }
+
+  static void set_scales(LightSample& s, uint32_t visibility, float diffuse, float glossy, float transmission) {
+    s.diffuse_scale = visibility & kRayDiffuse ? diffuse : 0.0f;
+    s.glossy_scale = visibility & kRayGlossy ? glossy : 0.0f;
+    s.transmission_scale = visibility & kRayTransmission ? transmission : 0.0f;
+  }
+
+  std::optional<LightSample> sample_lamp(uint32_t light, const LightQuery& query, Vec2 u) const {
+    const Lamp& lamp = lamps[light];
+    const LampData& data = *lamp.data;
+    if (query.path.depth > data.max_bounces) return std::nullopt;
+    const auto shape = std::visit([&](const auto& s) { return s.sample(query, u); }, lamp.shape);
+    if (!shape || !(shape->scale > 0.0f)) return std::nullopt;
+    LightSample s;
+    s.wi = shape->wi, s.distance = shape->distance, s.pdf_dir = shape->pdf_dir, s.is_delta = shape->is_delta, s.light = light;
+    s.radiance = data.color * shape->scale * lamp_program(lamp, query.position, s.wi, s.distance, seen_by_light(query.path, s.distance));
+    s.cast_shadow = data.cast_shadow, s.use_mis = data.use_mis && lamp.findable;
+    set_scales(s, data.visibility, data.diffuse_factor, data.glossy_factor, data.transmission_factor);
+    return s;
+  }
+
+  std::optional<LightSample> sample_triangle_light(uint32_t light, const LightQuery& query, Vec2 u) const {
+    const TriangleLight& triangle = triangles[light - first_triangle()];
+    const auto t = triangle.sample(query.position, u);
+    if (!t || !(t->pdf_dir > 0.0f)) return std::nullopt;
+    LightSample s;
+    s.wi = t->wi, s.distance = t->distance, s.pdf_dir = t->pdf_dir, s.light = light;
+    if (emission_is_constant[triangle.material]) {
+      s.radiance = constant_emission[triangle.material];
+    } else {
+      ShadingPoint p = scene.surface_point(triangle.instance, triangle.triangle, t->b1, t->b2, -t->wi, seen_by_light(query.path, t->distance));
+      s.radiance = scene.emission(p);
+    }
+    set_scales(s, scene.instances()[triangle.instance].data->visibility, 1, 1, 1);
+    return s;
+  }
+
+  std::optional<LightSample> sample_world(const LightQuery& query, Vec2 u) const {
+    const WorldData& data = scene.data().world;
+    if (query.path.depth > data.max_bounces) return std::nullopt;
+    const auto [wi, pdf] = world.sample(query, u);
+    if (!(pdf > 0.0f)) return std::nullopt;
+    LightSample s;
+    s.wi = wi, s.pdf_dir = pdf, s.light = world_light();
+    s.radiance = scene.world_radiance(wi, seen_by_light(query.path, kInf));
+    set_scales(s, data.visibility, 1, 1, 1);
+    return s;
+  }
+
+  std::optional<LightSample> sample_light(uint32_t light, const LightQuery& query, Vec2 u) const {
+    if (light < first_triangle()) return sample_lamp(light, query, u);
+    return light < world_light() ? sample_triangle_light(light, query, u) : sample_world(query, u);
+  }
+
+  std::optional<float> meet(uint32_t index, const Ray& ray, uint32_t visibility) const {
+    const Lamp& lamp = lamps[index];
+    if (!(lamp.data->visibility & visibility) || !(lamp.data->use_mis || (visibility & kRayCamera))) return std::nullopt;
+    return std::visit([&](const auto& s) -> std::optional<float> {
+      if constexpr (std::is_same_v<std::decay_t<decltype(s)>, SunLight>) return std::nullopt;
+      else return s.intersect(ray);
+    }, lamp.shape);
+  }
+};
+
+LightSet::LightSet(const Scene& scene, int threads)
+    : impl_(std::make_unique<const Impl>(scene, threads > 0 ? threads : int(std::max(1u, std::thread::hardware_concurrency())))) {}
+LightSet::~LightSet() = default;
+
+uint32_t LightSet::count() const { return impl_->count(); }
+uint32_t LightSet::sun_count() const { return uint32_t(impl_->suns.size()); }
+
+std::optional<LightSample> LightSet::sample(const LightQuery& query, float u_choice, Vec2 u) const {
+  const auto pick = impl_->pick(query, u_choice);
+  if (!pick || !(pick->probability > 0.0f)) return std::nullopt;
+  auto s = impl_->sample_light(pick->light, query, u);
+  if (s) s->pdf_dir *= pick->probability;
+  return s;
+}
+
+std::optional<LightSample> LightSet::sample_light(uint32_t light, const LightQuery& query, Vec2 u) const {
+  return impl_->sample_light(light, query, u);
+}
+
+float LightSet::pick_probability(const LightQuery& query, uint32_t light) const { return impl_->pick_probability(query, light); }
+
+std::optional<LampHit> LightSet::intersect_lamp(const Ray& ray, uint32_t visibility, const LampHit* after) const {
+  LampHit best;
+  impl_->bvh.visit(ray, [&](uint32_t lamp) {
+    const auto t = impl_->meet(lamp, ray, visibility);
+    if (!t || !(*t > ray.t_min) || !(*t < ray.t_max)) return;
+    // In order of (t, lamp), so that lamps in the same plane are all met.
+    if (after && (*t < after->t || (*t == after->t && lamp <= after->lamp))) return;
+    if (*t < best.t || (*t == best.t && lamp < best.lamp)) best = {*t, lamp};
+  });
+  if (best.t == kInf) return std::nullopt;
+  return best;
+}
+
+LightEval LightSet::eval_lamp(const LightQuery& from, const Ray& ray, const LampHit& hit) const {
+  const Lamp& lamp = impl_->lamps[hit.lamp];
+  const Vec3 wi = ray.direction;
+  if (from.path.depth > lamp.data->max_bounces) return {};
+  LightEval e;
+  std::visit([&](const auto& s) {
+    if constexpr (!std::is_same_v<std::decay_t<decltype(s)>, SunLight>) {
+      e.radiance = lamp.data->color * s.radiance(ray.origin, wi);
+      e.pdf_dir = s.pdf_dir(from, wi);
+    }
+  }, lamp.shape);
+  if (is_black(e.radiance)) return {};
+  e.radiance = e.radiance * impl_->lamp_program(lamp, ray.origin, wi, hit.t, seen_by_light(from.path, hit.t));
+  e.pdf_dir *= impl_->pick_probability(from, hit.lamp);
+  return e;
+}
+
+LightEval LightSet::eval_sun(uint32_t sun, const LightQuery& from, Vec3 direction, uint32_t visibility) const {
+  const uint32_t index = impl_->suns[sun];
+  const Lamp& lamp = impl_->lamps[index];
+  const SunLight& shape = std::get<SunLight>(lamp.shape);
+  if (!(lamp.data->visibility & visibility) || !(lamp.data->use_mis || (visibility & kRayCamera))) return {};
+  if (from.path.depth > lamp.data->max_bounces || !shape.shows(direction)) return {};
+  return {lamp.data->color * shape.scale * impl_->lamp_program(lamp, from.position, direction, kInf, seen_by_light(from.path, kInf)),
+          shape.pdf_dir() * impl_->pick_probability(from, index)};
+}
+
+float LightSet::pdf_triangle(const LightQuery& from, const ShadingPoint& point, float) const {
+  if (point.instance >= impl_->triangle_light.size()) return 0.0f;
+  const auto& table = impl_->triangle_light[point.instance];
+  if (table.empty() || table[point.triangle] == kNoId) return 0.0f;
+  const uint32_t light = table[point.triangle];
+  // By the direction, not by the ray's length: transparent surfaces on the way may have begun the ray anew.
+  const float pdf = impl_->triangles[light - impl_->first_triangle()].pdf_dir(from.position, -point.wo);
+  return pdf > 0.0f ? pdf * impl_->pick_probability(from, light) : 0.0f;
+}
+
+float LightSet::pdf_world(const LightQuery& from, Vec3 direction) const {
+  if (!impl_->world.emits() || from.path.depth > impl_->scene.data().world.max_bounces) return 0.0f;
+  return impl_->world.pdf_dir(from, direction) * impl_->pick_probability(from, impl_->world_light());
+}
+
+std::string LightSet::description() const {
+  return std::to_string(impl_->lamps.size()) + " lamps, " + std::to_string(impl_->triangles.size()) + " emissive triangles, " +
+         (impl_->world.emits() ? impl_->world.map_width() ? "world map " + std::to_string(impl_->world.map_width()) : "uniform world" : "no world");
+}
+
+}  // namespace gi

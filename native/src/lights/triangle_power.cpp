@@ -1,0 +1,119 @@
+// Runs the emission programs at a few points of every candidate, on both sides; triangles that show nothing are no lights
+// (rays still find them, with full weight).
+#include "lights/triangle_power.h"
+
+#include <atomic>
+
+#include "core/parallel.h"
+
+namespace gi {
+
+namespace {
+
+constexpr size_t kPointBudget = 400'000;  // evaluations, about; at least kLeastPoints a side
+constexpr int kLeastPoints = 4, kMostPoints = 64;
+
+struct Candidate {
+  uint32_t instance, triangle;
+};
+
+float magnitude(Rgb c) {
+  const float m = luminance({std::abs(c.r), std::abs(c.g), std::abs(c.b)});
+  return std::isfinite(m) ? m : 0.0f;
+}
+
+bool shines(const MaterialData& m) { return m.emission_sampling != EmissionSampling::kNone && m.program.has_emission(); }
+
+void measure_constants(const Scene& scene, TrianglePowers& out) {
+  const auto& materials = scene.data().materials;
+  out.constant_emission.resize(materials.size());
+  out.is_constant.assign(materials.size(), 0);
+  for (size_t i = 0; i < materials.size(); ++i) {
+    if (!shines(materials[i]) || !materials[i].program.emission_program().is_constant()) continue;
+    ShadingPoint nowhere;
+    nowhere.wo = nowhere.ng = nowhere.ns = {0, 0, 1};
+    out.constant_emission[i] = scene.run_emission(int(i), nowhere);
+    out.is_constant[i] = 1;
+  }
+}
+
+std::vector<Candidate> candidates(const Scene& scene) {
+  std::vector<Candidate> all;
+  for (uint32_t i = 0; i < scene.instances().size(); ++i) {
+    const Instance& instance = scene.instances()[i];
+    if (!(instance.data->visibility & (kRayDiffuse | kRayGlossy | kRayTransmission | kRayVolume))) continue;
+    bool any = false;
+    for (int32_t m : instance.data->materials) any = any || (m >= 0 && shines(scene.material(m)));
+    if (!any) continue;
+    const size_t n = scene.mesh(instance.mesh).triangle_count();
+    for (uint32_t t = 0; t < n; ++t) {
+      if (shines(scene.material(scene.material_of(i, t)))) all.push_back({i, t});
+    }
+  }
+  return all;
+}
+
+// Mean |luminance| that the side facing `wo` emits straight up.
+float side_radiance(const Scene& scene, Candidate c, Vec3 wo, int points, bool& backfacing) {
+  float sum = 0;
+  PathState path;
+  path.kind = 0, path.depth = 1;
+  for (int k = 0; k < points; ++k) {
+    // R2 sequence. [Roberts 2018]
+    const float x = 0.5f + 0.75487766f * float(k), y = 0.5f + 0.56984029f * float(k);
+    const Vec2 b = sample_triangle({x - std::floor(x), y - std::floor(y)});
+    ShadingPoint p = scene.surface_point(c.instance, c.triangle, b.x, b.y, wo, path);
+    backfacing = p.backfacing;
+    sum += magnitude(scene.emission(p));
+  }
+  return sum / float(points);
+}
+
+MeasuredTriangle measure(const Scene& scene, Candidate c, const TrianglePowers& constants, int points) {
+  MeasuredTriangle m;
+  Vec3 v[3];
+  scene.triangle_vertices(c.instance, c.triangle, v);
+  m.light.a = v[0], m.light.ab = v[1] - v[0], m.light.ac = v[2] - v[0];
+  m.light.instance = c.instance, m.light.triangle = c.triangle;
+  m.light.material = uint32_t(scene.material_of(c.instance, c.triangle));
+  const Vec3 n = m.light.normal();
+  if (!(m.light.area() > 0.0f) || !std::isfinite(m.light.area())) return m;
+
+  const EmissionSampling mode = scene.material(int(m.light.material)).emission_sampling;
+  const bool constant = constants.is_constant[m.light.material];
+  float side[2];
+  for (int k = 0; k < 2; ++k) {
+    bool backfacing = k == 1;
+    const Vec3 wo = k == 0 ? n : -n;
+    side[k] = side_radiance(scene, c, wo, constant ? 1 : points, backfacing);
+    if (mode == EmissionSampling::kFront && backfacing) side[k] = 0;
+    if (mode == EmissionSampling::kBack && !backfacing) side[k] = 0;
+  }
+  m.light.front = side[0] > 0, m.light.back = side[1] > 0;
+  m.radiance = std::max(side[0], side[1]);
+  return m;
+}
+
+}  // namespace
+
+TrianglePowers measure_triangles(const Scene& scene, int threads) {
+  TrianglePowers out;
+  measure_constants(scene, out);
+  const std::vector<Candidate> all = candidates(scene);
+  if (all.empty()) return out;
+  const int points = int(std::clamp<size_t>(kPointBudget / (2 * all.size()), kLeastPoints, kMostPoints));
+  std::vector<MeasuredTriangle> measured(all.size());
+  constexpr size_t kBlock = 1024;
+  ThreadPool pool(all.size() > kBlock ? threads : 1);
+  const std::atomic<bool> go_on{false};
+  pool.for_each(int((all.size() + kBlock - 1) / kBlock), go_on, [&](int block) {
+    const size_t end = std::min(all.size(), (size_t(block) + 1) * kBlock);
+    for (size_t i = size_t(block) * kBlock; i < end; ++i) measured[i] = measure(scene, all[i], out, points);
+  });
+  for (const MeasuredTriangle& m : measured) {
+    if (m.radiance > 0.0f) out.lights.push_back(m);
+  }
+  return out;
+}
+
+}  // namespace gi
