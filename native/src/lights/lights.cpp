@@ -306,6 +306,7 @@ LightSet::LightSet(const Scene& scene, int threads)
 LightSet::~LightSet() = default;
 
 uint32_t LightSet::count() const { return impl_->count(); }
+bool LightSet::is_world(uint32_t light) const { return light == impl_->world_light(); }
 uint32_t LightSet::sun_count() const { return uint32_t(impl_->suns.size()); }
 
 std::optional<LightSample> LightSet::sample(const LightQuery& query, float u_choice, Vec2 u) const {

@@ -69,10 +69,11 @@ inline Rgb lamps_along(const RenderContext& context, Ray ray, float t_surface, c
                        uint32_t visibility) {
   Rgb sum;
   ray.t_max = t_surface;
-  while (const auto hit = context.lights.intersect_lamp(ray, visibility)) {
+  auto hit = context.lights.intersect_lamp(ray, visibility);
+  while (hit) {
     const LightEval e = context.lights.eval_lamp(from.query, ray, *hit);
     sum += e.radiance * found_weight(mode, from.pdf_dir, e.pdf_dir);
-    ray.t_min = std::nextafter(hit->t, kInf) + 1e-6f * hit->t;
+    hit = context.lights.intersect_lamp(ray, visibility, &*hit);
   }
   return sum;
 }
