@@ -275,6 +275,4 @@ RenderSettings read_settings(nb::handle settings) {
   return s;
 }
 
-std::unique_ptr<ShaderResources> read_resources(nb::handle) { return std::make_unique<ShaderResources>(); }
-
 }  // namespace gi::bind
