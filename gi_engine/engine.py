@@ -73,16 +73,18 @@ class GIEngine(bpy.types.RenderEngine):
             if view:
                 self.active_view_set(view)
                 self.exported = self.export(depsgraph)
-            self.render_result(result)
+            self.render_result(result, depsgraph.view_layer.name)
             self.end_result(result)
         except Exception as error:
             self.end_result(result, cancel=True)
             self.fail(error)
 
-    def render_result(self, result) -> None:
+    def render_result(self, result, view_layer: str) -> None:
         scene, settings = self.exported.scene, self.exported.settings
         for message in self.exported.warnings:
             self.warn(message)
+        if control.inspected(view_layer, scene, settings):
+            return
         x0, y0, x1, y1 = scene.film.region
         if (x1 - x0, y1 - y0) != (result.resolution_x, result.resolution_y):
             raise RuntimeError(
