@@ -48,9 +48,10 @@ def camera_matrix(engine, camera_object) -> np.ndarray:
     if engine:
         # The API hands a flat column-major list in older versions and a Matrix in newer ones.
         world = np.array(engine.camera_model_matrix(camera_object, use_spherical_stereo=False), np.float32)
-        matrix = world if world.shape == (4, 4) else world.reshape(4, 4).T.copy()
+        world = world if world.shape == (4, 4) else world.reshape(4, 4).T
     else:
-        matrix = np.array(camera_object.matrix_world, np.float32)
+        world = np.array(camera_object.matrix_world, np.float32)
+    matrix = np.array(world, order="C")  # Blender's memory is column-major
     lengths = np.linalg.norm(matrix[:3, :3], axis=0)
     if not np.all(np.isfinite(matrix)) or np.any(lengths == 0):
         raise ValueError(f'camera "{camera_object.name}" has a singular matrix (scale 0 or not finite)')
