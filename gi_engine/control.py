@@ -31,9 +31,10 @@ class Control:
     overrides: dict = field(default_factory=dict)
     parameters: dict = field(default_factory=dict)
     on_progress: Callable[[Progress], None] | None = None
-    cancelled: bool = (
-        False  # set by a signal handler; the engine stops after the poll that sees it and keeps what it has
-    )
+    # Given each view layer's export instead of rendering it.
+    inspect: Callable[[str, Scene, Settings], None] | None = None
+    # Set by a signal handler; the engine stops after the poll that sees it and keeps what it has.
+    cancelled: bool = False
     last: Progress = field(default_factory=Progress)
     warnings: list[str] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)

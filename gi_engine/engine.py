@@ -90,8 +90,6 @@ class GIEngine(bpy.types.RenderEngine):
             raise RuntimeError(
                 f"border is {x1 - x0}x{y1 - y0} pixels, Blender expects {result.resolution_x}x{result.resolution_y}"
             )
-        if control.inspected(result.layers[0].name, scene, settings):
-            return
         self.update_stats("", "Building the scene")
         control.report(control.Progress(stage="Build"))
         with Session(scene, settings) as session:
