@@ -18,4 +18,5 @@ NB_MODULE(_core, m) {
   gi::bind::bind_render(m);
   gi::bind::bind_shading(m);
   gi::bind::bind_lobes(m);
+  gi::bind::bind_bsdf(m);
 }

@@ -11,6 +11,7 @@ namespace gi::bind {
 void bind_render(nanobind::module_& m);
 void bind_shading(nanobind::module_& m);
 void bind_lobes(nanobind::module_& m);
+void bind_bsdf(nanobind::module_& m);
 
 // The images of a scene_data.Scene.
 std::unique_ptr<ShaderResources> read_resources(nanobind::handle scene);

@@ -31,11 +31,14 @@ Rgb coat_absorption(const PrincipledTop& p, float cos_o) {
   return t;
 }
 
+// Where reflective caustics are left out, layers that reflect take nothing from what lies below them either.
+bool reflects(const ShadeState& s) { return !(s.bsdf->without() & kNoReflectiveCaustics); }
+
 Rgb add_coat(ShadeState& s, const PrincipledTop& p, Vec3 coat_normal, Rgb weight, bool add) {
   const Vec3 n = visible_normal(s, coat_normal);
   const float alpha = sqr(p.coat_roughness);
-  const Rgb albedo = add_ggx(s, weight * p.coat_weight, GgxLobe::reflection(alpha, alpha, Fresnel::dielectric(p.coat_ior)), n, {}, true, add);
-  weight = under_layer(weight, albedo);
+  const GgxLobe lobe = GgxLobe::reflection(alpha, alpha, Fresnel::dielectric(p.coat_ior));
+  if (reflects(s)) weight = under_layer(weight, add_ggx(s, weight * p.coat_weight, lobe, n, {}, true, add));
   return is_black(p.coat_tint - Rgb(1.0f)) ? weight : weight * coat_absorption(p, dot(n, s.point.wo));
 }
 
@@ -100,7 +103,7 @@ Rgb add_specular(ShadeState& s, const Principled& p, Vec3 n, Rgb weight) {
     f0 *= 2.0f * p.specular_level;
     eta = p.ior < 1.0f ? 1.0f / ior_from_f0(f0) : ior_from_f0(f0);
   }
-  if (eta == 1.0f && p.film_thickness <= kFilmCutoff) return weight;
+  if (!reflects(s) || (eta == 1.0f && p.film_thickness <= kFilmCutoff)) return weight;
   const Anisotropy a = anisotropy(p.roughness, p.anisotropic, p.anisotropic_rotation, p.normal, p.tangent);
   const Fresnel bare = Fresnel::schlick(eta, p.specular_tint * f0, Rgb(1.0f), Rgb(1.0f), Rgb());
   const Fresnel f = with_film(bare, p.film_thickness, p.film_ior);
