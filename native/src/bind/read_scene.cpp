@@ -59,7 +59,7 @@ struct Record {
     throw InputError(who + ": '" + field + "' must be one of " + valid + ", not '" + id + "'");
   }
   Affine matrix(const char* field) const {
-    const auto a = array<const float>(field);
+    const auto a = array<const float>(field, true);  // small: any number type will do
     require(a.size == 16, who + ": '" + field + "' must be a 4 x 4 matrix");
     Affine m;
     for (size_t i = 0; i < 12; ++i) m.m[i / 4][i % 4] = a[i];
@@ -67,12 +67,12 @@ struct Record {
   }
   // A contiguous array of any shape; None is empty.
   template <class T>
-  Array<T> array(const char* field) const {
+  Array<T> array(const char* field, bool convert = false) const {
     nb::object value = at(field);
     if (value.is_none()) return {};
     using Nd = nb::ndarray<T, nb::c_contig, nb::device::cpu>;
     Nd nd;
-    if (!nb::try_cast<Nd>(value, nd, false))
+    if (!nb::try_cast<Nd>(value, nd, convert))
       throw InputError(who + ": '" + field + "' must be a contiguous array of " + type_name<T>() + ", not " + nb::cast<std::string>(nb::str(nb::type_name(value.type()))));
     auto* keep = new Nd(nd);
     return {nd.data(), nd.size(), std::shared_ptr<void>(keep, [](void* p) {
