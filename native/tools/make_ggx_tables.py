@@ -76,9 +76,9 @@ def index(z):
     return (1 + np.sqrt(f0)) / (1 - np.sqrt(f0))
 
 
-def exponent(z):
+def schlick_curve(z):
     z = min(max(z, 1e-4), 0.99)
-    return 5 * (1 - z) / z
+    return lambda c: (1 - np.minimum(c, 1)) ** (5 * (1 - z) / z)
 
 
 def dielectric_curve(eta):
@@ -97,13 +97,16 @@ def tables(u2, u3):
         yield name + "E", [v.glass(eta(z)).mean() for z in g for row in few for v in row]
         yield name + "EMean", [(2 * mu * v.glass(eta(z))).mean() for z in g for v in mean_few]
     yield "kGgxDielectric", [v.weight(dielectric_curve(index(z))).mean() for z in g for row in few for v in row]
-    yield "kGgxSchlick", [v.weight(lambda c, e=exponent(z): (1 - np.minimum(c, 1)) ** e).mean() for z in g for row in few for v in row]
+    yield "kGgxSchlick", [v.weight(schlick_curve(z)).mean() for z in g for row in few for v in row]
 
 
 def main():
     u2 = qmc.Sobol(2, seed=1).random_base2(14)
     u3 = qmc.Sobol(3, seed=1).random_base2(15)
-    lines = ["// Written by native/tools/make_ggx_tables.py. Fractions of one, as unsigned 16-bit numbers.", "// clang-format off"]
+    lines = [
+        "// Written by native/tools/make_ggx_tables.py. Fractions of one, as unsigned 16-bit numbers.",
+        "// clang-format off",
+    ]
     for name, values in tables(u2, u3):
         numbers = [str(round(65535 * min(max(v, 0), 1))) for v in values]
         lines.append(f"constexpr uint16_t {name}[{len(numbers)}] = {{")

@@ -16,15 +16,24 @@ LOBES = {
     "ggx 1": ("ggx_reflection", {"alpha": [1.0]}),
     "ggx .5 .08": ("ggx_reflection", {"alpha_x": [0.5], "alpha_y": [0.08]}),
     "ggx schlick": ("ggx_reflection", {"alpha": [0.2], "fresnel": SCHLICK, "ior": [1.5], "f0": [0.1, 0.04, 0.02]}),
-    "ggx f82": ("ggx_reflection", {"alpha": [0.2], "fresnel": F82, "f0": [0.9, 0.6, 0.3], "edge_tint": [0.5, 0.8, 1.0]}),
-    "ggx gold": ("ggx_reflection", {"alpha": [0.3], "fresnel": CONDUCTOR, "n": [0.18, 0.42, 1.37], "k": [3.4, 2.35, 1.77]}),
+    "ggx f82": (
+        "ggx_reflection",
+        {"alpha": [0.2], "fresnel": F82, "f0": [0.9, 0.6, 0.3], "edge_tint": [0.5, 0.8, 1.0]},
+    ),
+    "ggx gold": (
+        "ggx_reflection",
+        {"alpha": [0.3], "fresnel": CONDUCTOR, "n": [0.18, 0.42, 1.37], "k": [3.4, 2.35, 1.77]},
+    ),
     "ggx refraction": ("ggx_refraction", {"alpha": [0.2], "ior": [1.5]}),
     "ggx refraction inside": ("ggx_refraction", {"alpha": [0.2], "ior": [1 / 1.5]}),
     "ggx glass": ("ggx_glass", {"alpha": [0.3], **GLASS}),
     "ggx glass inside": ("ggx_glass", {"alpha": [0.3], **INSIDE}),
     "ggx rough glass": ("ggx_glass", {"alpha": [1.0], **GLASS}),
     "ggx diamond inside": ("ggx_glass", {"alpha": [0.1], "fresnel": DIELECTRIC, "ior": [1 / 2.4]}),
-    "ggx tinted glass": ("ggx_glass", {"alpha": [0.3], "fresnel": SCHLICK, "ior": [1.3], "transmission_tint": [0.9, 0.5, 0.1]}),
+    "ggx tinted glass": (
+        "ggx_glass",
+        {"alpha": [0.3], "fresnel": SCHLICK, "ior": [1.3], "transmission_tint": [0.9, 0.5, 0.1]},
+    ),
     "beckmann .05": ("beckmann_reflection", {"alpha": [0.05]}),
     "beckmann .3": ("beckmann_reflection", {"alpha": [0.3]}),
     "beckmann 1": ("beckmann_reflection", {"alpha": [1.0]}),
@@ -193,7 +202,9 @@ def test_fresnel_of_metals(cos_i):
         assert mirror(fresnel=F82, f0=[f0], edge_tint=[0.4]) == pytest.approx(0.4 * schlick, abs=1e-5)
 
 
-@pytest.mark.parametrize("name", ["ggx_reflection", "ggx_glass", "beckmann_reflection", "beckmann_glass", "ashikhmin_shirley"])
+@pytest.mark.parametrize(
+    "name", ["ggx_reflection", "ggx_glass", "beckmann_reflection", "beckmann_glass", "ashikhmin_shirley"]
+)
 def test_extremes_stay_finite(name):
     rng = np.random.default_rng(8)
     cosines = np.concatenate([10.0 ** rng.uniform(-6, 0, 500), 1 - 10.0 ** rng.uniform(-7, 0, 500)])

@@ -40,13 +40,17 @@ struct Parameters {
 Fresnel make_fresnel(const Parameters& p) {
   const float ior = p.f("ior", 1.0f);
   switch (int(p.f("fresnel", 0.0f))) {
-    case 1: return Fresnel::dielectric(ior);
+    case 1:
+      return Fresnel::dielectric(ior);
     case 2:
       return Fresnel::schlick(ior, p.c("f0", Rgb(f0_from_ior(ior))), p.c("f90", Rgb(1.0f)), p.c("reflection_tint", Rgb(1.0f)),
                               p.c("transmission_tint", Rgb(1.0f)), p.f("exponent", -1.0f));
-    case 3: return Fresnel::f82_tint(p.c("f0", Rgb(0.8f)), p.c("edge_tint", Rgb(1.0f)));
-    case 4: return Fresnel::conductor(p.c("n", Rgb(1.0f)), p.c("k", Rgb(1.0f)));
-    default: return Fresnel::none(ior);
+    case 3:
+      return Fresnel::f82_tint(p.c("f0", Rgb(0.8f)), p.c("edge_tint", Rgb(1.0f)));
+    case 4:
+      return Fresnel::conductor(p.c("n", Rgb(1.0f)), p.c("k", Rgb(1.0f)));
+    default:
+      return Fresnel::none(ior);
   }
 }
 
@@ -58,8 +62,10 @@ Microfacet<D> make_microfacet(const std::string& side, const Parameters& p) {
                        : side == "refraction" ? Microfacet<D>::refraction(alpha, fresnel)
                                               : Microfacet<D>::glass(alpha, fresnel);
   const float cos_o = p.f("preserve_energy_at", -1.0f);
-  if (cos_o >= 0.0f && p.values.contains("mean")) lobe.preserve_energy(cos_o, p.c("mean", Rgb(1.0f)));
-  else if (cos_o >= 0.0f) lobe.preserve_energy(cos_o);
+  if (cos_o >= 0.0f && p.values.contains("mean"))
+    lobe.preserve_energy(cos_o, p.c("mean", Rgb(1.0f)));
+  else if (cos_o >= 0.0f)
+    lobe.preserve_energy(cos_o);
   return lobe;
 }
 
@@ -92,12 +98,14 @@ Output lobe_eval(const std::string& name, const Values& values, Input wo, Input 
   const Lobe lobe = make_lobe(name, {values});
   float* data;
   Output out = make_output(wi.shape(0), 4, &data);
-  std::visit([&](const auto& l) {
-    for (size_t i = 0; i < wi.shape(0); ++i) {
-      const LobeEval e = l.eval(row_of(wo, wo.shape(0) == 1 ? 0 : i), row_of(wi, i));
-      store(data + 4 * i, e.value), data[4 * i + 3] = e.pdf_dir;
-    }
-  }, lobe);
+  std::visit(
+      [&](const auto& l) {
+        for (size_t i = 0; i < wi.shape(0); ++i) {
+          const LobeEval e = l.eval(row_of(wo, wo.shape(0) == 1 ? 0 : i), row_of(wi, i));
+          store(data + 4 * i, e.value), data[4 * i + 3] = e.pdf_dir;
+        }
+      },
+      lobe);
   return out;
 }
 
@@ -106,16 +114,18 @@ Output lobe_sample(const std::string& name, const Values& values, Input wo, Inpu
   const Lobe lobe = make_lobe(name, {values});
   float* data;
   Output out = make_output(u.shape(0), 9, &data);
-  std::visit([&](const auto& l) {
-    for (size_t i = 0; i < u.shape(0); ++i) {
-      const Vec3 r = row_of(u, i);
-      const auto s = l.sample(row_of(wo, wo.shape(0) == 1 ? 0 : i), {r.x, r.y}, r.z);
-      if (!s) continue;
-      float* row = data + 9 * i;
-      store(row, {s->wi.x, s->wi.y, s->wi.z}), store(row + 3, s->value);
-      row[6] = s->pdf_dir, row[7] = s->flags, row[8] = s->roughness;
-    }
-  }, lobe);
+  std::visit(
+      [&](const auto& l) {
+        for (size_t i = 0; i < u.shape(0); ++i) {
+          const Vec3 r = row_of(u, i);
+          const auto s = l.sample(row_of(wo, wo.shape(0) == 1 ? 0 : i), {r.x, r.y}, r.z);
+          if (!s) continue;
+          float* row = data + 9 * i;
+          store(row, {s->wi.x, s->wi.y, s->wi.z}), store(row + 3, s->value);
+          row[6] = s->pdf_dir, row[7] = s->flags, row[8] = s->roughness;
+        }
+      },
+      lobe);
   return out;
 }
 
@@ -123,9 +133,11 @@ Output lobe_albedo(const std::string& name, const Values& values, Input wo) {
   const Lobe lobe = make_lobe(name, {values});
   float* data;
   Output out = make_output(wo.shape(0), 3, &data);
-  std::visit([&](const auto& l) {
-    for (size_t i = 0; i < wo.shape(0); ++i) store(data + 3 * i, l.albedo(row_of(wo, i)));
-  }, lobe);
+  std::visit(
+      [&](const auto& l) {
+        for (size_t i = 0; i < wo.shape(0); ++i) store(data + 3 * i, l.albedo(row_of(wo, i)));
+      },
+      lobe);
   return out;
 }
 

@@ -32,9 +32,11 @@ uint8_t sides_without(uint8_t flags, uint8_t without) {
   return flags & ((without & kNoReflectiveCaustics ? kReflection : 0) | (without & kNoRefractiveCaustics ? kTransmission : 0));
 }
 void remove_side(Lobe& lobe, uint8_t side) {
-  std::visit([side](auto& l) {
-    if constexpr (requires { l.remove(side); }) l.remove(side);
-  }, lobe);
+  std::visit(
+      [side](auto& l) {
+        if constexpr (requires { l.remove(side); }) l.remove(side);
+      },
+      lobe);
 }
 
 }  // namespace
@@ -110,8 +112,7 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, Vec2 u, float u_lobe) const {
     if (left < e.select) return sample_entry(e, wo, u, std::min(left / e.select, kOneMinusEpsilon));
     left -= e.select;
   }
-  if (select_transparent_ > 0.0f)
-    return BsdfSample{-wo, transparency, select_transparent_, kTransparent, 0.0f};
+  if (select_transparent_ > 0.0f) return BsdfSample{-wo, transparency, select_transparent_, kTransparent, 0.0f};
   // Rounding left a little over: it belongs to the last lobe that can be chosen.
   for (int i = count_ - 1; i >= 0; --i)
     if (entries_[i].select > 0.0f) return sample_entry(entries_[i], wo, u, kOneMinusEpsilon);

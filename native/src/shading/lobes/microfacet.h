@@ -45,7 +45,10 @@ struct Microfacet {
  private:
   static Microfacet make(float alpha_x, float alpha_y, const Fresnel& fresnel, uint8_t sides) {
     const float ax = clamp01(alpha_x), ay = clamp01(alpha_y);
-    return {.facets = {ax, ay}, .fresnel = fresnel, .sides = sides, .smooth = ax * ay <= 2e-10f || ((sides & kTransmission) && straight(fresnel.ior))};
+    return {.facets = {ax, ay},
+            .fresnel = fresnel,
+            .sides = sides,
+            .smooth = ax * ay <= 2e-10f || ((sides & kTransmission) && straight(fresnel.ior))};
   }
   bool reflects() const { return sides & kReflection; }
   bool transmits() const { return sides & kTransmission; }
@@ -146,10 +149,10 @@ Rgb Microfacet<D>::albedo(Vec3 wo) const {
     const float s = fresnel.exponent < 0.0f ? ggx_dielectric_weight(roughness(), cos_o, fresnel.ior)
                                             : ggx_schlick_weight(roughness(), cos_o, fresnel.exponent);
     const Rgb f = lerp(fresnel.f0, fresnel.f90, s);
-    return tint * ((reflects() ? f * fresnel.reflection_tint : Rgb()) + (transmits() ? (Rgb(1.0f) - f) * fresnel.transmission_tint : Rgb()));
+    return tint *
+           ((reflects() ? f * fresnel.reflection_tint : Rgb()) + (transmits() ? (Rgb(1.0f) - f) * fresnel.transmission_tint : Rgb()));
   }
-  if (fresnel.model == Fresnel::Model::kF82)
-    return tint * lerp(fresnel.f0, Rgb(1.0f), ggx_schlick_weight(roughness(), cos_o, 5.0f));
+  if (fresnel.model == Fresnel::Model::kF82) return tint * lerp(fresnel.f0, Rgb(1.0f), ggx_schlick_weight(roughness(), cos_o, 5.0f));
   if (fresnel.model == Fresnel::Model::kDielectric && fresnel.ior > 1.0f && reflects()) {
     const float f = lerp(f0_from_ior(fresnel.ior), 1.0f, ggx_dielectric_weight(roughness(), cos_o, fresnel.ior));
     return tint * (transmits() ? fresnel.reflection_tint * f + fresnel.transmission_tint * (1.0f - f) : fresnel.reflection_tint * f);

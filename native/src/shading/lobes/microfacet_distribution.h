@@ -21,7 +21,8 @@ struct Ggx {
   // pdf of the reflected direction, when normals come from sample_visible.
   float pdf_reflected(Vec3 wo, float d) const { return d / (4.0f * wo.z * (1.0f + lambda(wo))); }
 
-  // The same without most normals that would reflect below the surface. [Eto & Tokuyoshi 2023, "Bounded VNDF sampling for Smith–GGX reflections"]
+  // The same without most normals that would reflect below the surface. [Eto & Tokuyoshi 2023, "Bounded VNDF sampling for Smith–GGX
+  // reflections"]
   Vec3 sample_visible_bounded(Vec3 wo, Vec2 u) const { return sample_cap(wo, u, bound(wo)); }
   float pdf_reflected_bounded(Vec3 wo, float d) const {
     const float t = std::sqrt(sqr(alpha_x * wo.x) + sqr(alpha_y * wo.y) + wo.z * wo.z);
