@@ -4,13 +4,30 @@
 
 namespace gi {
 
+struct SinCos {
+  float sin, cos;
+};
+// Of |x| ≤ π/4 to a bit or two: several times as fast as libm's, and the same on every machine. [Moshier 1989, Cephes sinf, cosf]
+inline SinCos sincos_octant(float x) {
+  const float x2 = x * x;
+  return {x + x * x2 * (-1.6666654611e-1f + x2 * (8.3321608736e-3f + x2 * -1.9515295891e-4f)),
+          1.0f - 0.5f * x2 + x2 * x2 * (4.166664568298827e-2f + x2 * (-1.388731625493765e-3f + x2 * 2.443315711809948e-5f))};
+}
+// Of an angle of `turns` full turns, 0 ≤ turns ≤ 1.
+inline SinCos sincos_turns(float turns) {
+  const int quarter = int(4.0f * turns + 0.5f);
+  const SinCos r = sincos_octant((2.0f * kPi) * (turns - 0.25f * float(quarter)));
+  const SinCos swapped = quarter & 1 ? SinCos{r.cos, r.sin} : r;
+  return {quarter & 2 ? -swapped.sin : swapped.sin, (quarter + 1) & 2 ? -swapped.cos : swapped.cos};
+}
+
 // [Shirley & Chiu 1997] concentric map to the unit disk; density 1/π.
 inline Vec2 sample_disk(Vec2 u) {
   const float a = 2.0f * u.x - 1.0f, b = 2.0f * u.y - 1.0f;
   if (a == 0.0f && b == 0.0f) return {0, 0};
   const bool wide = std::abs(a) > std::abs(b);
-  const float r = wide ? a : b, phi = wide ? (kPi / 4) * (b / a) : (kPi / 2) - (kPi / 4) * (a / b);
-  return {r * std::cos(phi), r * std::sin(phi)};
+  const SinCos t = sincos_octant((kPi / 4) * (wide ? b / a : a / b));
+  return wide ? Vec2{a * t.cos, a * t.sin} : Vec2{b * t.sin, b * t.cos};
 }
 // Cosine-weighted hemisphere about +z; pdf_dir = cos θ / π.
 inline Vec3 sample_cosine_hemisphere(Vec2 u) {

@@ -16,8 +16,10 @@ constexpr uint8_t kKinds = kDiffuse | kGlossy | kSpecular;
 uint8_t flags_of(const Lobe& lobe) {
   return std::visit([](const auto& l) { return l.flags(); }, lobe);
 }
-LobeEval eval_of(const Lobe& lobe, Vec3 wo, Vec3 wi) {
-  return std::visit([&](const auto& l) { return l.eval(wo, wi); }, lobe);
+LobeEval eval_of(const Lobe& lobe, const Frame& frame, Vec3 wo, Vec3 wi, float cos_i) {
+  if (const Lambert* lambert = std::get_if<Lambert>(&lobe)) return lambert->eval({}, {0, 0, cos_i});  // the commonest needs no frame
+  const Vec3 wo_local = frame.to_local(wo), wi_local{dot(frame.x, wi), dot(frame.y, wi), cos_i};
+  return std::visit([&](const auto& l) { return l.eval(wo_local, wi_local); }, lobe);
 }
 Rgb albedo_of(const Lobe& lobe, Vec3 wo) {
   return std::visit([&](const auto& l) { return l.albedo(wo); }, lobe);
@@ -84,13 +86,13 @@ LobeEval Bsdf::eval_if(Vec3 wo, Vec3 wi, const Entry* skipped, Accept accept) co
   LobeEval sum;
   for (const Entry& e : *this) {
     if (&e == skipped || (e.flags & kSpecular)) continue;
-    const Vec3 wi_local = e.frame.to_local(wi);
-    if (!(e.flags & (wi_local.z < 0.0f ? kTransmission : kReflection))) continue;
-    const float s = shadowing(e, wi, wi_local.z, false);
+    const float cos_i = dot(e.frame.z, wi);
+    if (!(e.flags & (cos_i < 0.0f ? kTransmission : kReflection))) continue;
+    const float s = shadowing(e, wi, cos_i, false);
     if (s == 0.0f) continue;
-    const LobeEval l = eval_of(e.lobe, e.frame.to_local(wo), wi_local);
+    const LobeEval l = eval_of(e.lobe, e.frame, wo, wi, cos_i);
     sum.pdf_dir += e.select * l.pdf_dir;
-    if (accept(e, wi_local.z)) sum.value += e.weight * l.value * s;
+    if (accept(e, cos_i)) sum.value += e.weight * l.value * s;
   }
   return sum;
 }
@@ -140,7 +142,7 @@ std::optional<BsdfSample> Bsdf::sample_delta(Vec3 wo, float u_lobe) const {
 std::optional<BsdfSample> Bsdf::sample_entry(const Entry& e, Vec3 wo, Vec2 u, float u_lobe) const {
   const auto s = sample_of(e.lobe, e.frame.to_local(wo), u, u_lobe);
   if (!s || !(s->pdf_dir > 0.0f)) return {};
-  const Vec3 wi = normalize(e.frame.to_world(s->wi));
+  const Vec3 wi = e.frame.to_world(s->wi);
   const bool transmitted = s->flags & kTransmission;
   if ((dot(ng_, wi) < 0.0f) != transmitted) return {};
 

@@ -88,17 +88,15 @@ template <class D>
 LobeEval Microfacet<D>::eval_reflection(Vec3 wo, Vec3 wi, Vec3 h, const FresnelTerms& f) const {
   const float d = facets.density(h), p = pdf_reflect(f);
   const float pdf = p * (transmits() ? facets.pdf_reflected(wo, d) : facets.pdf_reflected_bounded(wo, d));
-  const float g2 = 1.0f / (1.0f + facets.lambda(wo) + facets.lambda(wi));
-  return {f.reflectance * tint * (energy_scale * d * g2 / (4.0f * wo.z)), pdf};
+  return {f.reflectance * tint * (energy_scale * d * facets.shadowing(wo, wi)), pdf};
 }
 
 template <class D>
 LobeEval Microfacet<D>::eval_transmission(Vec3 wo, Vec3 wi, Vec3 h, const FresnelTerms& f) const {
   const float cos_ho = dot(h, wo), cos_hi = dot(h, wi), eta = fresnel.ior;
-  const float jacobian = sqr(eta / (eta * cos_hi + cos_ho)) * std::abs(cos_ho * cos_hi);
-  const float common = facets.density(h) * jacobian / wo.z, lambda_o = facets.lambda(wo);
-  return {f.transmittance * tint * (energy_scale * common / (1.0f + lambda_o + facets.lambda(wi))),
-          (1.0f - pdf_reflect(f)) * common / (1.0f + lambda_o)};
+  const float d = facets.density(h), jacobian = 4.0f * sqr(eta / (eta * cos_hi + cos_ho)) * std::abs(cos_ho * cos_hi);
+  return {f.transmittance * tint * (energy_scale * d * jacobian * facets.shadowing(wo, wi)),
+          (1.0f - pdf_reflect(f)) * jacobian * facets.pdf_reflected(wo, d)};
 }
 
 template <class D>

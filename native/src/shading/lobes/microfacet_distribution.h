@@ -1,4 +1,4 @@
-// Distributions of microfacet normals: density D, Smith's Λ, and drawing the normals visible from wo.
+// Distributions of microfacet normals: density D, Smith's shadowing G2, and drawing the normals visible from wo.
 // Directions are local, z the mean normal, wo.z > 0. Leaves out Fresnel and everything a BSDF adds (microfacet.h).
 #pragma once
 #include "core/vec.h"
@@ -10,34 +10,37 @@ struct Ggx {
   float alpha_x = 0, alpha_y = 0;
 
   float density(Vec3 h) const {
-    const float e = sqr(h.x / alpha_x) + sqr(h.y / alpha_y) + h.z * h.z;
-    return kInvPi / (alpha_x * alpha_y * e * e);
+    const float s = alpha_x * alpha_y;
+    const float t = alpha_x == alpha_y ? h.x * h.x + h.y * h.y : h.x * h.x * (alpha_y / alpha_x) + h.y * h.y * (alpha_x / alpha_y);
+    return s * kInvPi / sqr(t + h.z * h.z * s);
   }
-  // [Heitz 2014, "Understanding the masking-shadowing function", eq. 72]
-  float lambda(Vec3 v) const { return 0.5f * (std::sqrt(1.0f + (sqr(alpha_x * v.x) + sqr(alpha_y * v.y)) / (v.z * v.z)) - 1.0f); }
+  // G2 / (4 wo.z), height-correlated. [Heitz 2014, "Understanding the masking-shadowing function", eq. 72 and 99]
+  float shadowing(Vec3 wo, Vec3 wi) const {
+    const float zi = std::abs(wi.z);
+    return 0.5f * zi / (stretched(wo) * zi + stretched(wi) * wo.z);
+  }
 
   // Visible normals by a spherical cap. [Dupuy & Benyoub 2023, "Sampling visible GGX normals with spherical caps"]
   Vec3 sample_visible(Vec3 wo, Vec2 u) const { return sample_cap(wo, u, 1.0f); }
-  // pdf of the reflected direction, when normals come from sample_visible.
-  float pdf_reflected(Vec3 wo, float d) const { return d / (4.0f * wo.z * (1.0f + lambda(wo))); }
+  // pdf of the reflected direction: D G1 / (4 wo.z). `d` is the density of the normal that sample_visible returned.
+  float pdf_reflected(Vec3 wo, float d) const { return 0.5f * d / (wo.z + stretched(wo)); }
 
   // The same without most normals that would reflect below the surface. [Eto & Tokuyoshi 2023, "Bounded VNDF sampling for Smith–GGX
   // reflections"]
   Vec3 sample_visible_bounded(Vec3 wo, Vec2 u) const { return sample_cap(wo, u, bound(wo)); }
-  float pdf_reflected_bounded(Vec3 wo, float d) const {
-    const float t = std::sqrt(sqr(alpha_x * wo.x) + sqr(alpha_y * wo.y) + wo.z * wo.z);
-    return d / (2.0f * (bound(wo) * wo.z + t));
-  }
+  float pdf_reflected_bounded(Vec3 wo, float d) const { return 0.5f * d / (bound(wo) * wo.z + stretched(wo)); }
 
  private:
+  float stretched(Vec3 v) const { return std::sqrt(sqr(alpha_x * v.x) + sqr(alpha_y * v.y) + v.z * v.z); }
   float bound(Vec3 wo) const {
     const float a2 = sqr(std::min({alpha_x, alpha_y, 1.0f})), s2 = sqr(1.0f + std::sqrt(wo.x * wo.x + wo.y * wo.y));
     return (1.0f - a2) * s2 / (s2 + a2 * wo.z * wo.z);
   }
   Vec3 sample_cap(Vec3 wo, Vec2 u, float k) const {
     const Vec3 v = normalize(Vec3{alpha_x * wo.x, alpha_y * wo.y, wo.z});
-    const float phi = 2.0f * kPi * u.x, z = (1.0f - u.y) * (1.0f + k * v.z) - k * v.z, s = safe_sqrt(1.0f - z * z);
-    const Vec3 h{s * std::cos(phi) + v.x, s * std::sin(phi) + v.y, z + v.z};
+    const SinCos phi = sincos_turns(u.x);
+    const float z = (1.0f - u.y) * (1.0f + k * v.z) - k * v.z, s = safe_sqrt(1.0f - z * z);
+    const Vec3 h{s * phi.cos + v.x, s * phi.sin + v.y, z + v.z};
     return normalize_or({alpha_x * h.x, alpha_y * h.y, std::max(h.z, 0.0f)}, {0, 0, 1});
   }
 };
@@ -66,13 +69,14 @@ struct Beckmann {
     const float c2 = h.z * h.z;
     return std::exp(-(sqr(h.x / alpha_x) + sqr(h.y / alpha_y)) / c2) * kInvPi / (alpha_x * alpha_y * c2 * c2);
   }
-  // Exact, not the usual rational fit: the density of visible normals must be the one that is sampled. [Heitz 2014, eq. 67]
+  // Smith's Λ. Exact, not the usual rational fit: the density of visible normals must be the one that is sampled. [Heitz 2014, eq. 67]
   float lambda(Vec3 v) const {
     const float tan2 = (sqr(alpha_x * v.x) + sqr(alpha_y * v.y)) / (v.z * v.z);
     if (tan2 < 1.0f / 16.0f) return 0.0f;  // below 1e-9 there
     const float a = 1.0f / std::sqrt(tan2);
     return std::max(0.5f * (std::exp(-a * a) * 0.56418958f / a - std::erfc(a)), 0.0f);
   }
+  float shadowing(Vec3 wo, Vec3 wi) const { return 0.25f / (wo.z * (1.0f + lambda(wo) + lambda(wi))); }
 
   Vec3 sample_visible(Vec3 wo, Vec2 u) const {
     const Vec3 v = normalize(Vec3{alpha_x * wo.x, alpha_y * wo.y, wo.z});
