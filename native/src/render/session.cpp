@@ -47,6 +47,7 @@ void Session::run() {
   std::string error;
   try {
     ThreadPool pool(settings_.threads);
+    scene_.resources().camera = &camera_;
     const LightSet lights(scene_);
     const RenderContext context{scene_, lights, camera_, pool, settings_.seed, cancelled_, tiles_done_};
     integrator_->prepare(context);

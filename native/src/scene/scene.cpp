@@ -263,22 +263,23 @@ Rgb Scene::transmittance(const Ray& ray, const PathState& path) const {
 
 // ---------------------------------------------------------------- attributes
 
-bool Scene::attribute(const ShadingPoint& point, int slot, float out[4]) const {
+int Scene::attribute(const ShadingPoint& point, int slot, float out[4]) const {
   out[0] = out[1] = out[2] = 0.0f, out[3] = 1.0f;
-  if (point.instance == kNoId || slot < 0) return false;
+  if (point.instance == kNoId || size_t(slot) >= data_.attribute_names.size()) return 0;
   const Instance& placed = instances_[point.instance];
   const int index = attribute_index_[placed.mesh][size_t(slot)];
   if (index < 0) {
     for (const InstanceAttribute& a : placed.data->attributes) {
       if (a.name != data_.attribute_names[size_t(slot)]) continue;
       std::copy_n(a.value, 4, out);
-      return true;
+      return 4;
     }
-    return false;
+    return 0;
   }
   const MeshData& mesh = data_.meshes[placed.mesh];
-  interpolate(mesh, mesh.attributes[size_t(index)], point, out);
-  return true;
+  const AttributeData& found = mesh.attributes[size_t(index)];
+  interpolate(mesh, found, point, out);
+  return found.components;
 }
 
 bool Scene::active_uv(const ShadingPoint& point, float out[4]) const {

@@ -62,8 +62,8 @@ class Scene {
   const ShaderResources& resources() const { return *resources_; }
 
   // The attribute in slot `slot` (SceneData::attribute_names; "" is the active UV map) at the point; falls back on object
-  // and instancer attributes. False if the object has none. Missing components: 0, alpha 1.
-  bool attribute(const ShadingPoint& point, int slot, float out[4]) const;
+  // and instancer attributes. Returns how many components it has; 0 if the object has none. Missing components: 0, alpha 1.
+  int attribute(const ShadingPoint& point, int slot, float out[4]) const;
   bool active_uv(const ShadingPoint& point, float out[4]) const;  // the UV map that renders by default
   // Directions ∂P/∂u, ∂P/∂v of a UV map over the surface, world space. False if there is none or it is degenerate.
   bool uv_tangents(const ShadingPoint& point, int slot, Vec3& dp_du, Vec3& dp_dv) const;

@@ -6,6 +6,11 @@
 
 namespace gi {
 
+std::span<const Op> math_ops();
+std::span<const Op> vector_ops();
+std::span<const Op> color_ops();
+std::span<const Op> input_ops();
+std::span<const Op> normal_ops();
 std::span<const Op> closure_ops();
 
 }  // namespace gi

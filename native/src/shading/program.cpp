@@ -70,6 +70,7 @@ void Program::check() const {
       require(size_t(slot) >= constants_.size(), where + "writes into a constant");
     });
     instruction.for_inputs(in_range);
+    require(!op.accepts || op.accepts(code_.data() + at + op.width() - op.immediates, tables_.size()), where + "refers to a table that is not there");
     if (code_[at] == kJump) {
       const int32_t target = code_[at + 2];
       require(target > int32_t(at) && size_t(target) <= code_.size(), where + "does not jump forwards");

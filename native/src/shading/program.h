@@ -64,6 +64,8 @@ struct Op {
   OpKind kind;
   OpFunction run;       // null for jump_if_zero, which the interpreter itself runs
   uint8_t effects = 0;
+  // Whether the immediates are in order, given the size of the program's tables; null: any are.
+  bool (*accepts)(const int32_t* immediates, size_t tables) = nullptr;
   int width() const { return 1 + int(std::strlen(outputs)) + int(std::strlen(inputs)) + immediates; }
 };
 

@@ -6,10 +6,12 @@ namespace gi {
 
 class Scene;
 class ImageSet;
+struct Camera;
 
 struct ShaderResources {
   std::shared_ptr<const ImageSet> images;
   const Scene* scene = nullptr;  // set by Scene
+  mutable const Camera* camera = nullptr;  // set by Session, for the nodes that ask for it
 };
 
 }  // namespace gi

@@ -1,0 +1,179 @@
+// Ops that make normals and tangents: normal maps, bumps from heights at shifted points, displacement as bump.
+#include "scene/scene.h"
+#include "shading/object_space.h"
+#include "shading/op_helpers.h"
+#include "shading/ops.h"
+
+namespace gi {
+namespace {
+
+// ---------------------------------------------------------------- normal maps
+
+Vec3 map_color(const Operands& o, int i, bool invert_green) {
+  const Vec3 c = o.v(i) * 2.0f - Vec3{1, 1, 1};
+  return {c.x, invert_green ? -c.y : c.y, c.z};
+}
+
+void set_or_keep(const Operands& o, const ShadeState& s, Vec3 n) {
+  o.set(0, n == Vec3{} || !is_finite(n) ? s.point.ns : n);
+}
+
+// colour, strength; UV slot, green goes down. The frame is that of the UV map, about the interpolated normal.
+void normal_map_tangent(const Operands& o, ShadeState& s) {
+  const ShadingPoint& p = s.point;
+  Vec3 du, dv;
+  const Instance* instance = instance_of(s);
+  if (!instance || !s.resources.scene->uv_tangents(p, o.imm(3), du, dv)) return o.set(0, p.ns);
+  Vec3 c = map_color(o, 1, o.imm(4) != 0);
+  const float strength = o.f(2);
+  c = {c.x * strength, c.y * strength, lerp(1.0f, c.z, clamp01(strength))};
+  // In object space, where the normal is as it was before it was turned towards the viewer.
+  const Vec3 n = normal_to_object(s, p.backfacing ? -p.ns : p.ns);
+  du = instance->to_object.vector(du), dv = instance->to_object.vector(dv);
+  const Vec3 tangent = normalize(du - n * dot(n, du));
+  const float side = dot(cross(n, tangent), dv) < 0.0f ? -1.0f : 1.0f;
+  const Vec3 mapped = normal_to_world(s, normalize(c.x * tangent + c.y * side * cross(n, tangent) + c.z * n));
+  set_or_keep(o, s, p.backfacing ? -mapped : mapped);
+}
+
+// colour, strength; object space (else world), Blender's old sign of y and z, green goes down
+void normal_map_space(const Operands& o, ShadeState& s) {
+  const ShadingPoint& p = s.point;
+  Vec3 c = map_color(o, 1, o.imm(5) != 0);
+  if (o.imm(4)) c.y = -c.y, c.z = -c.z;
+  Vec3 n = o.imm(3) ? normal_to_world(s, c) : normalize(c);
+  if (p.backfacing) n = -n;
+  const float strength = std::max(o.f(2), 0.0f);
+  set_or_keep(o, s, strength == 1.0f ? n : normalize(lerp(p.ns, n, strength)));
+}
+
+// ---------------------------------------------------------------- bump
+
+// Paths that carry no footprint step by this part of the scene's size.
+constexpr float kDefaultStep = 1e-4f;
+
+struct Steps {
+  Vec3 dx, dy;  // one pixel over the surface
+};
+Steps pixel_steps(const ShadeState& s) {
+  const ShadingPoint& p = s.point;
+  if (!(p.dpdx == Vec3{})) return {p.dpdx * 2.0f, p.dpdy * 2.0f};  // the footprint is a radius
+  const Frame frame = Frame::from_normal(p.ng);
+  const float step = s.resources.scene && !s.resources.scene->bounds().empty() ? kDefaultStep * length(s.resources.scene->bounds().extent()) : kDefaultStep;
+  return {frame.x * step, frame.y * step};
+}
+
+// Moves the barycentrics with the position: least squares on the triangle's plane.
+void shift_barycentrics(ShadeState& s, Vec3 d) {
+  ShadingPoint& p = s.point;
+  if (!s.resources.scene || p.triangle == kNoId) return;
+  Vec3 v[3];
+  s.resources.scene->triangle_vertices(p.instance, p.triangle, v);
+  const Vec3 e1 = v[1] - v[0], e2 = v[2] - v[0];
+  const float a = dot(e1, e1), b = dot(e1, e2), c = dot(e2, e2), det = a * c - b * b, x = dot(d, e1), y = dot(d, e2);
+  if (det > 0.0f) p.b1 += (c * x - b * y) / det, p.b2 += (a * y - b * x) / det;
+}
+
+// filter width -> what bump_restore needs; axis. Everything until then sees the point moved along the surface.
+void bump_shift(const Operands& o, ShadeState& s) {
+  ShadingPoint& p = s.point;
+  const float width = o.f(3);
+  o.set(0, p.position), o.set(1, p.object_position), o.set(2, Vec3{p.b1, p.b2, 0.0f});
+  const Steps steps = pixel_steps(s);
+  const Vec3 d = (o.imm(4) ? steps.dy : steps.dx) * width;
+  p.position += d;
+  const Instance* i = instance_of(s);
+  p.object_position += i ? i->to_object.vector(d) : d;
+  shift_barycentrics(s, d);
+}
+
+void bump_restore(const Operands& o, ShadeState& s) {
+  s.point.position = o.v(0), s.point.object_position = o.v(1);
+  const Vec3 b = o.v(2);
+  s.point.b1 = b.x, s.point.b2 = b.y;
+}
+
+// heights here, along x, along y; strength, distance, filter width; normal; object space.
+// [Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU"]
+void bump(const Operands& o, ShadeState& s) {
+  const float here = o.f(1), along_x = o.f(2), along_y = o.f(3), strength = std::max(o.f(4), 0.0f), distance = o.f(5), width = o.f(6);
+  const Vec3 given = normalize_or(o.v(7), s.point.ns);
+  Vec3 n = given;
+  Steps steps = pixel_steps(s);
+  const Instance* instance = o.imm(8) ? instance_of(s) : nullptr;
+  if (instance) {
+    n = normal_to_object(s, n);
+    steps = {instance->to_object.vector(steps.dx), instance->to_object.vector(steps.dy)};
+  }
+  const Vec3 rx = cross(steps.dy, n), ry = cross(n, steps.dx);
+  const float det = dot(steps.dx, rx);
+  const Vec3 gradient = (along_x - here) * rx + (along_y - here) * ry;
+  const Vec3 bumped = normalize(n * (width * std::abs(det)) - gradient * std::copysign(distance, distance * det));
+  if (bumped == Vec3{}) return o.set(0, given);
+  Vec3 r = normalize(lerp(n, bumped, strength));
+  if (instance) r = normal_to_world(s, r);
+  set_or_keep(o, s, r);
+}
+
+void set_normal(const Operands& o, ShadeState& s) { s.point.ns = normalize_or(o.v(0), s.point.ns); }
+
+// height, middle, scale, normal -> offset; object space
+void displacement(const Operands& o, ShadeState& s) {
+  const Vec3 n = normalize_or(o.v(4), s.point.ns);
+  const float amount = (o.f(1) - o.f(2)) * o.f(3);
+  const Instance* i = instance_of(s);
+  o.set(0, o.imm(5) && i ? i->to_world.vector(normal_to_object(s, n) * amount) : n * amount);
+}
+
+// vector, middle, scale -> offset; UV slot, space (0 tangent, 1 object, 2 world)
+void vector_displacement(const Operands& o, ShadeState& s) {
+  const float middle = o.f(2);
+  Vec3 d = (o.v(1) - Vec3{middle, middle, middle}) * o.f(3);
+  const Instance* i = instance_of(s);
+  if (!i || o.imm(5) == 2) return o.set(0, d);
+  if (o.imm(5) == 0) {
+    Vec3 du, dv;
+    const Vec3 n = normal_to_object(s, s.point.ns);
+    if (!s.resources.scene->uv_tangents(s.point, o.imm(4), du, dv)) du = Frame::from_normal(n).x, dv = Frame::from_normal(n).y;
+    const Vec3 t = normalize(i->to_object.vector(du)), b = normalize(cross(n, t)) * (dot(cross(n, t), i->to_object.vector(dv)) < 0.0f ? -1.0f : 1.0f);
+    d = t * d.x + n * d.y + b * d.z;
+  }
+  o.set(0, i->to_world.vector(d));
+}
+
+// ---------------------------------------------------------------- tangents
+
+// In the plane of the shading normal; zero where `t` says nothing.
+Vec3 along_surface(const ShadeState& s, Vec3 t) { return cross(s.point.ns, normalize(cross(t, s.point.ns))); }
+
+void tangent_uv(const Operands& o, ShadeState& s) {
+  Vec3 du, dv;
+  if (!instance_of(s) || !s.resources.scene->uv_tangents(s.point, o.imm(1), du, dv)) return o.set(0, Vec3{});
+  o.set(0, along_surface(s, du));
+}
+
+// generated coordinates; axis to turn about
+void tangent_radial(const Operands& o, ShadeState& s) {
+  const Vec3 c = o.v(1) - Vec3{0.5f, 0.5f, 0.5f};
+  const Vec3 t = o.imm(2) == 0 ? Vec3{0, -c.z, c.y} : o.imm(2) == 1 ? Vec3{-c.z, 0, c.x} : Vec3{-c.y, c.x, 0};
+  o.set(0, along_surface(s, normal_to_world(s, t)));
+}
+
+const Op kOps[] = {
+    {"normal_map_tangent", "v", "vf", 2, OpKind::kContext, normal_map_tangent},
+    {"normal_map_space", "v", "vf", 3, OpKind::kContext, normal_map_space},
+    {"bump_shift", "vvv", "f", 1, OpKind::kControl, bump_shift},
+    {"bump_restore", "", "vvv", 0, OpKind::kControl, bump_restore},
+    {"bump", "v", "ffffffv", 1, OpKind::kContext, bump},
+    {"set_normal", "", "v", 0, OpKind::kControl, set_normal},
+    {"displacement", "v", "fffv", 1, OpKind::kContext, displacement},
+    {"vector_displacement", "v", "vff", 2, OpKind::kContext, vector_displacement},
+    {"tangent_uv", "v", "", 1, OpKind::kContext, tangent_uv},
+    {"tangent_radial", "v", "v", 1, OpKind::kContext, tangent_radial},
+};
+
+}  // namespace
+
+std::span<const Op> normal_ops() { return kOps; }
+
+}  // namespace gi
