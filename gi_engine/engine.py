@@ -16,7 +16,7 @@ from .session import UPDATE_SECONDS, RenderFailed, Session
 
 WHOLE = 1 << 16  # begin_result clamps it to the border's size
 PREVIEW_SAMPLES = 32
-USER_ERRORS = (ExportError, RenderFailed, native.NativeMissing, MemoryError, ValueError)
+USER_ERRORS = (ExportError, RenderFailed, native.NativeMissing)
 
 # Said once in an animation, not once a frame.
 _reported: set[str] = set()

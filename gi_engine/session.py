@@ -19,8 +19,13 @@ class Session:
     """Owns the native scene and session. Use as a context manager: leaving it stops the threads."""
 
     def __init__(self, scene: Scene, settings: Settings):
-        self.native_scene = native.build_scene(scene, settings.threads)
-        self.native = native.module().Session(self.native_scene, scene.camera, scene.film, settings)
+        try:
+            self.native_scene = native.build_scene(scene, settings.threads)
+            self.native = native.module().Session(self.native_scene, scene.camera, scene.film, settings)
+        except native.NativeMissing:
+            raise
+        except (ValueError, RuntimeError) as error:  # bad input, a library that fails
+            raise RenderFailed(str(error)) from error
 
     def __enter__(self) -> Session:
         self.native.start()
