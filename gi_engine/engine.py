@@ -102,7 +102,7 @@ class GIEngine(bpy.types.RenderEngine):
         """Shows the image as it grows until it is done or the user has had enough."""
         shown = time.monotonic()
         while not session.wait():
-            if self.test_break() or control.cancelled():
+            if self.stopped():
                 session.native.cancel()
                 break
             if time.monotonic() - shown >= UPDATE_SECONDS:
@@ -114,6 +114,9 @@ class GIEngine(bpy.types.RenderEngine):
         self.tell(progress)
         if progress["bad_samples"]:
             self.warn(f"{progress['bad_samples']} samples were not finite numbers and were left out")
+
+    def stopped(self) -> bool:
+        return self.test_break() or control.cancelled()
 
     def show(self, session: Session, result) -> None:
         for blender_pass in result.layers[0].passes:

@@ -15,31 +15,36 @@ class Pass:
     old_name: str  # Blender's before that
     channels: str
     kind: str  # COLOR, VALUE or VECTOR
-    wanted: str  # the view layer's property, "" for always
+    wanted: tuple[str, ...] = ()  # the view layer's properties that ask for it; none: always there
 
     @property
     def blender_name(self) -> str:
         return self.name if NAMES_CHANGED else self.old_name
 
 
+# Cycles' switches, which mean the same here.
+DENOISING = "cycles.denoising_store_passes"
+SAMPLE_COUNT = "cycles.pass_debug_sample_count"
+
 PASSES = (
-    Pass("Combined", "Combined", "RGBA", "COLOR", ""),
-    Pass("Depth", "Depth", "Z", "VALUE", "use_pass_z"),
-    Pass("Normal", "Normal", "XYZ", "VECTOR", "use_pass_normal"),
-    Pass("Position", "Position", "XYZ", "VECTOR", "use_pass_position"),
-    Pass("UV", "UV", "UVA", "VECTOR", "use_pass_uv"),
-    Pass("Object Index", "IndexOB", "X", "VALUE", "use_pass_object_index"),
-    Pass("Material Index", "IndexMA", "X", "VALUE", "use_pass_material_index"),
-    Pass("Emission", "Emit", "RGB", "COLOR", "use_pass_emit"),
-    Pass("Environment", "Env", "RGB", "COLOR", "use_pass_environment"),
-    Pass("Albedo", "Albedo", "RGB", "COLOR", "gi_engine.use_pass_albedo"),
-    Pass("Sample Count", "Sample Count", "X", "VALUE", "gi_engine.use_pass_sample_count"),
+    Pass("Combined", "Combined", "RGBA", "COLOR"),
+    Pass("Depth", "Depth", "Z", "VALUE", ("use_pass_z",)),
+    Pass("Normal", "Normal", "XYZ", "VECTOR", ("use_pass_normal",)),
+    Pass("Position", "Position", "XYZ", "VECTOR", ("use_pass_position",)),
+    Pass("UV", "UV", "UVA", "VECTOR", ("use_pass_uv",)),
+    Pass("Object Index", "IndexOB", "X", "VALUE", ("use_pass_object_index",)),
+    Pass("Material Index", "IndexMA", "X", "VALUE", ("use_pass_material_index",)),
+    Pass("Emission", "Emit", "RGB", "COLOR", ("use_pass_emit",)),
+    Pass("Environment", "Env", "RGB", "COLOR", ("use_pass_environment",)),
+    Pass("Denoising Albedo", "Denoising Albedo", "RGB", "COLOR", ("gi_engine.use_pass_albedo", DENOISING)),
+    Pass("Denoising Normal", "Denoising Normal", "XYZ", "VECTOR", (DENOISING,)),
+    Pass("Debug Sample Count", "Debug Sample Count", "X", "VALUE", ("gi_engine.use_pass_sample_count", SAMPLE_COUNT)),
 )
 
 
 def passes_of(view_layer) -> list[Pass]:
     """The passes that the view layer asks for."""
-    return [p for p in PASSES if not p.wanted or flag(view_layer, p.wanted)]
+    return [p for p in PASSES if not p.wanted or any(flag(view_layer, path) for path in p.wanted)]
 
 
 def flag(owner, path: str) -> bool:
