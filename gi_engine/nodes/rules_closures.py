@@ -130,7 +130,16 @@ def refraction(b, weight):
 @closure_rule("ShaderNodeBsdfGlass")
 def glass(b, weight):
     distribution = DISTRIBUTIONS[b.node.distribution]
-    b.op("glass", weight, b.input("Color"), b.input("Roughness"), b.input("IOR"), normal(b), *film(b), imm=(distribution,))
+    b.op(
+        "glass",
+        weight,
+        b.input("Color"),
+        b.input("Roughness"),
+        b.input("IOR"),
+        normal(b),
+        *film(b),
+        imm=(distribution,),
+    )
 
 
 @closure_rule("ShaderNodeBsdfMetallic")
@@ -217,8 +226,11 @@ def eevee_specular(b, weight):
     b.warn("is a node for EEVEE alone; it renders black, as in Cycles")
 
 
-@closure_rule("ShaderNodeVolumeAbsorption", "ShaderNodeVolumeScatter", "ShaderNodeVolumePrincipled", "ShaderNodeVolumeCoefficients")
+@closure_rule(
+    "ShaderNodeVolumeAbsorption",
+    "ShaderNodeVolumeScatter",
+    "ShaderNodeVolumePrincipled",
+    "ShaderNodeVolumeCoefficients",
+)
 def volume(b, weight):
     b.warn("volumes are not rendered yet; on a surface it renders black, as in Cycles")
-
-

@@ -99,7 +99,7 @@ def main() -> None:
 
 def write(table: np.ndarray) -> None:
     print("// Made by native/tools/fit_sheen.py; do not edit. Rows: roughness 0..1, columns: view cosine 0..1.")
-    print("// A, B: inverse linear transform; R: albedo.")
+    print("// A, B: inverse linear transform; R: albedo.\n// clang-format off")
     print("#pragma once\n\nnamespace gi {\n")
     print(f"inline constexpr int kSheenGrid = {GRID};")
     for k, name in enumerate(("A", "B", "R")):

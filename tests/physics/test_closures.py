@@ -57,7 +57,9 @@ def test_samples_follow_the_density(name, parameters, cos_o):
 
     # A cone's edge crosses bins: many points for the integral to see it.
     order = 96 if name == "toon" else 24
-    chi2.assert_matches(sample, lambda wi: _core.lobe_eval(name, parameters, wo, wi)[:, 3], tests=len(CASES), order=order)
+    chi2.assert_matches(
+        sample, lambda wi: _core.lobe_eval(name, parameters, wo, wi)[:, 3], tests=len(CASES), order=order
+    )
 
 
 @pytest.mark.parametrize(("name", "parameters", "cos_o"), CASES)
@@ -138,7 +140,14 @@ WHITE = {
     "thin glass": {"transmission": 1.0, "thin_wall": 1.0, "roughness": 0.4},
     "leaf": {"subsurface": 1.0, "thin_wall": 1.0, "subsurface_anisotropy": 0.3, "diffuse_roughness": 0.6},
     "diamond": {"ior": 2.4, "roughness": 1.0},
-    "everything": {"coat": 0.6, "sheen": 0.7, "metallic": 0.3, "transmission": 0.4, "diffuse_roughness": 1.0, "roughness": 0.8},
+    "everything": {
+        "coat": 0.6,
+        "sheen": 0.7,
+        "metallic": 0.3,
+        "transmission": 0.4,
+        "diffuse_roughness": 1.0,
+        "roughness": 0.8,
+    },
 }
 
 
@@ -210,7 +219,9 @@ def test_thin_glass_is_the_series_of_its_reflections():
     cos_t = np.sqrt(1 - (1 - cos_o**2) / ior**2)
     s, p = (cos_o - ior * cos_t) / (cos_o + ior * cos_t), (cos_t - ior * cos_o) / (cos_t + ior * cos_o)
     f, c = 0.5 * (s * s + p * p), color ** (1 / cos_t)
-    sample = principled(cos_o, transmission=1.0, thin_wall=1.0, roughness=0.0, base_color=(color,) * 3).sample(numbers(1000))
+    sample = principled(cos_o, transmission=1.0, thin_wall=1.0, roughness=0.0, base_color=(color,) * 3).sample(
+        numbers(1000)
+    )
     up = sample[:, 2] > 0
     through = (1 - f) ** 2 * c / (1 - (f * c) ** 2)
     assert sample[up, 3] == pytest.approx(f + through * f * c, rel=1e-3)
@@ -233,7 +244,9 @@ def test_mix_and_alpha():
     b.op("emission", first, (1.0, 0.0, 0.0), 1.0)
     b.op("emission", second, (0.0, 1.0, 0.0), 1.0)
     p = b.finish("test")
-    point = _core.ShadedPoint(p.code.tolist(), p.constants.tolist(), p.register_count, p.tables.tolist(), (0.0, 0.0, 1.0))
+    point = _core.ShadedPoint(
+        p.code.tolist(), p.constants.tolist(), p.register_count, p.tables.tolist(), (0.0, 0.0, 1.0)
+    )
     assert point.emission == pytest.approx((0.0, 0.5, 0.0))
 
 

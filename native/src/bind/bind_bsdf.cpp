@@ -71,8 +71,8 @@ class ShadedPoint {
 
 void bind_bsdf(nb::module_& m) {
   nb::class_<ShadedPoint>(m, "ShadedPoint")
-      .def(nb::init<std::vector<int32_t>, std::vector<float>, int, std::vector<float>, Triple, bool>(), nb::arg("code"), nb::arg("constants"),
-           nb::arg("register_count"), nb::arg("tables"), nb::arg("wo"), nb::arg("backfacing") = false)
+      .def(nb::init<std::vector<int32_t>, std::vector<float>, int, std::vector<float>, Triple, bool>(), nb::arg("code"),
+           nb::arg("constants"), nb::arg("register_count"), nb::arg("tables"), nb::arg("wo"), nb::arg("backfacing") = false)
       .def("eval", &ShadedPoint::eval)
       .def("sample", &ShadedPoint::sample)
       .def_prop_ro("albedo", [](const ShadedPoint& p) { return triple(p.bsdf().albedo(p.wo())); })

@@ -99,20 +99,18 @@ void glass(const Operands& o, ShadeState& s) {
   const bool inside = s.point.backfacing;
   const Fresnel bare = Fresnel::schlick(inside ? 1.0f / ior : ior, Rgb(f0_from_ior(ior)), Rgb(1.0f), color, color);
   const Fresnel f = with_film(bare, o.f(5), inside ? film_ior / ior : film_ior);
-  add_facets(s, Rgb(o.f(0)), o.imm(7), visible_normal(s, normal_or_shading(s, o.v(4))), {},
-             [&]<class L>() { return L::glass(alpha, f); });
+  add_facets(s, Rgb(o.f(0)), o.imm(7), visible_normal(s, normal_or_shading(s, o.v(4))), {}, [&]<class L>() { return L::glass(alpha, f); });
 }
 
 void metallic(const Operands& o, ShadeState& s) {
   if (!s.bsdf) return;
   const bool physical = o.imm(11) != 0;
-  const Fresnel bare = physical ? Fresnel::conductor(positive(o.c(1)), positive(o.c(2)))
-                                : Fresnel::f82_tint(clamped(o.c(1)), clamped(o.c(2)));
+  const Fresnel bare =
+      physical ? Fresnel::conductor(positive(o.c(1)), positive(o.c(2))) : Fresnel::f82_tint(clamped(o.c(1)), clamped(o.c(2)));
   const Fresnel f = with_film(bare, o.f(8), std::max(o.f(9), 1e-5f));
   const Vec3 n = normal_or_shading(s, o.v(6)), tangent = o.v(7);
   const Anisotropy a = anisotropy(clamp01(o.f(3)), clamp01(o.f(4)), o.f(5), n, tangent);
-  add_facets(s, Rgb(o.f(0)), o.imm(10), visible_normal(s, n), a.tangent,
-             [&]<class L>() { return L::reflection(a.alpha_x, a.alpha_y, f); });
+  add_facets(s, Rgb(o.f(0)), o.imm(10), visible_normal(s, n), a.tangent, [&]<class L>() { return L::reflection(a.alpha_x, a.alpha_y, f); });
 }
 
 // Operands one after the other, for the ops that have many.
@@ -162,7 +160,6 @@ void principled_emission(const Operands& o, ShadeState& s) {
   s.bsdf->emission += color * through * r.f();
 }
 
-// The second strings of the last two are what read_top reads.
 const Op kOps[] = {
     {"mix_weights", "ff", "ff", 0, OpKind::kPure, mix_weights},
     {"emission", "", "fvf", 0, OpKind::kClosure, emission, kAddsEmission},
@@ -178,8 +175,8 @@ const Op kOps[] = {
     {"refraction", "", "fvffv", 1, OpKind::kClosure, refraction, kAddsLobe},
     {"glass", "", "fvffvff", 1, OpKind::kClosure, glass, kAddsLobe},
     {"metallic", "", "fvvfffvvff", 2, OpKind::kClosure, metallic, kAddsLobe},
-    {"principled", "", "ffv" "fffvvffv" "vffff" "fff" "fv" "ffv" "fff", 1, OpKind::kClosure, principled, kAddsLobe},
-    {"principled_emission", "", "ffv" "fffvvffv" "vf", 0, OpKind::kClosure, principled_emission, kAddsEmission},
+    {"principled", "", "ffvfffvvffvvffffffffvffvfff", 1, OpKind::kClosure, principled, kAddsLobe},
+    {"principled_emission", "", "ffvfffvvffvvf", 0, OpKind::kClosure, principled_emission, kAddsEmission},
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // Made by native/tools/fit_sheen.py; do not edit. Rows: roughness 0..1, columns: view cosine 0..1.
 // A, B: inverse linear transform; R: albedo.
+// clang-format off
 #pragma once
 
 namespace gi {
