@@ -19,4 +19,5 @@ NB_MODULE(_core, m) {
   gi::bind::bind_shading(m);
   gi::bind::bind_lobes(m);
   gi::bind::bind_bsdf(m);
+  gi::bind::bind_lights(m);
 }

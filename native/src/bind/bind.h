@@ -12,6 +12,7 @@ void bind_render(nanobind::module_& m);
 void bind_shading(nanobind::module_& m);
 void bind_lobes(nanobind::module_& m);
 void bind_bsdf(nanobind::module_& m);
+void bind_lights(nanobind::module_& m);
 
 // The images of a scene_data.Scene.
 std::unique_ptr<ShaderResources> read_resources(nanobind::handle scene);

@@ -1,0 +1,152 @@
+// The lights of a scene for the tests: chosen, sampled and found along rays over arrays of points.
+// Leaves out what lies between: nothing is in shadow here.
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+
+#include <chrono>
+
+#include "bind/bind.h"
+#include "bind/read_scene.h"
+#include "core/sampler.h"
+#include "lights/lights.h"
+
+namespace nb = nanobind;
+
+namespace gi::bind {
+namespace {
+
+using Rows = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Table = nb::ndarray<nb::numpy, float>;
+
+Vec3 row_of(const Rows& a, size_t i) {
+  if (a.shape(0) == 1) i = 0;
+  return {a(i, 0), a(i, 1), a(i, 2)};
+}
+
+Table make_table(size_t rows, size_t columns, float** data) {
+  *data = new float[rows * columns]();
+  nb::capsule owner(*data, [](void* p) noexcept { delete[] static_cast<float*>(p); });
+  return Table(*data, {rows, columns}, owner);
+}
+
+class TestLights {
+ public:
+  TestLights(nb::handle data, const std::string& embree, int threads) {
+    SceneData native = read_scene(data);
+    std::unique_ptr<ShaderResources> resources = read_resources(data);
+    std::vector<std::string> warnings;
+    validate(native, warnings);
+    scene_ = std::make_unique<Scene>(std::move(native), std::move(resources), embree, threads);
+    const auto start = std::chrono::steady_clock::now();
+    lights_ = std::make_unique<LightSet>(*scene_, threads);
+    build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+
+  // u: choice and two of the direction. Columns: wi, distance, radiance, pdf_dir, delta, light; light −1 where there is none.
+  Table sample(Rows position, Rows normal, Rows u, int light, bool transmission) const {
+    float* data;
+    Table out = make_table(u.shape(0), 10, &data);
+    for (size_t i = 0; i < u.shape(0); ++i) {
+      const LightQuery query = make_query(position, normal, i, transmission);
+      const Vec3 r = row_of(u, i);
+      const auto s = light < 0 ? lights_->sample(query, r.x, {r.y, r.z}) : lights_->sample_light(uint32_t(light), query, {r.y, r.z});
+      float* row = data + 10 * i;
+      row[9] = -1;
+      if (!s) continue;
+      const float values[10] = {s->wi.x,      s->wi.y,      s->wi.z,    s->distance,       s->radiance.r,
+                                s->radiance.g, s->radiance.b, s->pdf_dir, float(s->is_delta), float(s->light)};
+      std::copy(values, values + 10, row);
+    }
+    return out;
+  }
+
+  // Everything that rays from `position` meet, as diffuse rays do. Columns: radiance, and the densities summed.
+  Table eval(Rows position, Rows normal, Rows wi, bool transmission, uint32_t visibility) const {
+    float* data;
+    Table out = make_table(wi.shape(0), 4, &data);
+    for (size_t i = 0; i < wi.shape(0); ++i) {
+      const LightQuery query = make_query(position, normal, i, transmission);
+      const LightEval e = everything(query, {query.position, row_of(wi, i)}, visibility);
+      const float values[4] = {e.radiance.r, e.radiance.g, e.radiance.b, e.pdf_dir};
+      std::copy(values, values + 4, data + 4 * i);
+    }
+    return out;
+  }
+
+  Table pick_probabilities(Rows position, Rows normal, bool transmission) const {
+    float* data;
+    Table out = make_table(position.shape(0), lights_->count(), &data);
+    for (size_t i = 0; i < position.shape(0); ++i) {
+      const LightQuery query = make_query(position, normal, i, transmission);
+      for (uint32_t k = 0; k < lights_->count(); ++k) data[i * lights_->count() + k] = lights_->pick_probability(query, k);
+    }
+    return out;
+  }
+
+  // Seconds that `count` samples take at the given points, and their densities at the same.
+  nb::tuple time(Rows position, Rows normal, int count) const {
+    using Clock = std::chrono::steady_clock;
+    Sampler sampler(1, 2, 3);
+    float sum = 0;
+    const auto start = Clock::now();
+    for (int i = 0; i < count; ++i) {
+      const LightQuery query = make_query(position, normal, size_t(i) % position.shape(0), false);
+      const auto s = lights_->sample(query, sampler.next_1d(), sampler.next_2d());
+      sum += s ? s->pdf_dir : 0.0f;
+    }
+    const auto middle = Clock::now();
+    for (int i = 0; i < count; ++i) {
+      const LightQuery query = make_query(position, normal, size_t(i) % position.shape(0), false);
+      sum += lights_->pick_probability(query, hash32(uint32_t(i)) % lights_->count());
+    }
+    const auto end = Clock::now();
+    return nb::make_tuple(std::chrono::duration<double>(middle - start).count(), std::chrono::duration<double>(end - middle).count(), sum);
+  }
+
+  uint32_t count() const { return lights_->count(); }
+  std::string description() const { return lights_->description(); }
+  double build_seconds = 0;
+
+ private:
+  static LightQuery make_query(const Rows& position, const Rows& normal, size_t i, bool transmission) {
+    return {row_of(position, i), row_of(normal, i), transmission, {}};
+  }
+
+  LightEval everything(const LightQuery& query, Ray ray, uint32_t visibility) const {
+    LightEval sum;
+    const auto add = [&](const LightEval& e) { sum.radiance += e.radiance, sum.pdf_dir += e.pdf_dir; };
+    for (auto hit = lights_->intersect_lamp(ray, visibility); hit; hit = lights_->intersect_lamp(ray, visibility, &*hit)) {
+      add(lights_->eval_lamp(query, ray, *hit));
+    }
+    for (uint32_t k = 0; k < lights_->sun_count(); ++k) add(lights_->eval_sun(k, query, ray.direction, visibility));
+    const PathState path;
+    while (const auto hit = scene_->intersect(ray, visibility)) {
+      ShadingPoint point = scene_->shading_point(ray, *hit, path);
+      add({scene_->emission(point), lights_->pdf_triangle(query, point, hit->t)});
+      ray.t_min = hit->t * 1.00001f + 1e-6f;
+    }
+    if (scene_->data().world.visibility & visibility) {
+      add({scene_->world_radiance(ray.direction, path), lights_->pdf_world(query, ray.direction)});
+    }
+    return sum;
+  }
+
+  std::unique_ptr<Scene> scene_;
+  std::unique_ptr<LightSet> lights_;
+};
+
+}  // namespace
+
+void bind_lights(nb::module_& m) {
+  nb::class_<TestLights>(m, "TestLights")
+      .def(nb::init<nb::handle, const std::string&, int>(), nb::arg("scene"), nb::arg("embree"), nb::arg("threads") = 0)
+      .def("sample", &TestLights::sample, nb::arg("position"), nb::arg("normal"), nb::arg("u"), nb::arg("light") = -1, nb::arg("transmission") = false)
+      .def("eval", &TestLights::eval, nb::arg("position"), nb::arg("normal"), nb::arg("wi"), nb::arg("transmission") = false, nb::arg("visibility") = uint32_t(kRayDiffuse))
+      .def("pick_probabilities", &TestLights::pick_probabilities, nb::arg("position"), nb::arg("normal"), nb::arg("transmission") = false)
+      .def("time", &TestLights::time)
+      .def_prop_ro("count", &TestLights::count)
+      .def_prop_ro("description", &TestLights::description)
+      .def_ro("build_seconds", &TestLights::build_seconds);
+}
+
+}  // namespace gi::bind
