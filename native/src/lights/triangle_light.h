@@ -46,11 +46,12 @@ struct TriangleLight {
 
   struct Corners {
     Vec3 a, b, c;
-    float solid_angle;
+    float determinant, solid_angle;
     bool by_angle;
     Corners(const TriangleLight& t, Vec3 p) : a(normalize(t.a - p)), b(normalize(t.a + t.ab - p)), c(normalize(t.a + t.ac - p)) {
       // [Van Oosterom & Strackee 1983]
-      solid_angle = 2.0f * std::abs(std::atan2(dot(a, cross(b, c)), 1.0f + dot(a, b) + dot(a, c) + dot(b, c)));
+      determinant = dot(a, cross(b, c));
+      solid_angle = 2.0f * std::abs(std::atan2(determinant, 1.0f + dot(a, b) + dot(a, c) + dot(b, c)));
       by_angle = solid_angle > kMinSolidAngle && solid_angle < kMaxSolidAngle;
     }
   };
@@ -65,27 +66,21 @@ struct TriangleLight {
     return TriangleSample{wi, distance, pdf, b.x, b.y};
   }
 
-  // [Arvo 1995, "Stratified sampling of spherical triangles"]: u.x cuts off a triangle of that share of the area by an arc
-  // through b, u.y goes along the arc.
+  // As Arvo [1995, "Stratified sampling of spherical triangles"]: u.x moves c along the arc a–c so as to cut off that share
+  // of the solid angle, u.y goes along the arc from b to it. From tan(Ω/2) above, the bisector `o` of a and the moved c
+  // is linear in a and c, without the angles that slivers lose their digits in. [Peters 2021, "BRDF importance sampling
+  // for polygonal lights"]
   std::optional<TriangleSample> sample_by_angle(const Corners& k, Vec3 position, Vec2 u) const {
-    const Vec3 n_ab = normalize(cross(k.a, k.b)), n_ca = normalize(cross(k.c, k.a));
-    if (n_ab == Vec3{0, 0, 0} || n_ca == Vec3{0, 0, 0}) return sample_failed(k, position);
-    const float cos_alpha = std::clamp(-dot(n_ab, n_ca), -1.0f, 1.0f), sin_alpha = length(cross(n_ab, n_ca));
-    const float area = u.x * k.solid_angle;
-    const float s = std::sin(area) * cos_alpha - std::cos(area) * sin_alpha;  // sin(area − α)
-    const float t = std::cos(area) * cos_alpha + std::sin(area) * sin_alpha;  // cos(area − α)
-    const float p = t - cos_alpha, q = s + sin_alpha * dot(k.a, k.b);
-    float cos_b = ((t * q - s * p) * cos_alpha - q) / ((s * q + t * p) * sin_alpha);
-    if (!std::isfinite(cos_b)) cos_b = 1.0f;
-    cos_b = std::clamp(cos_b, -1.0f, 1.0f);
-    const Vec3 c_cut = k.a * cos_b + normalize(k.c - k.a * dot(k.c, k.a)) * safe_sqrt(1.0f - cos_b * cos_b);
-    const float cos_arc = 1.0f - u.y * (1.0f - dot(c_cut, k.b));
-    const Vec3 wi = normalize(k.b * cos_arc + normalize(c_cut - k.b * dot(c_cut, k.b)) * safe_sqrt(1.0f - cos_arc * cos_arc));
-    return on_triangle(position, wi, 1.0f / k.solid_angle);
-  }
+    const float half = 0.5f * u.x * k.solid_angle, sin = std::sin(half), cos = std::cos(half);
+    const Vec3 o = k.a * (std::abs(k.determinant) * cos - dot(k.a + k.b, k.c) * sin) + k.c * ((1.0f + dot(k.a, k.b)) * sin);
+    const float o2 = length_squared(o);
+    const Vec3 cut = o2 > 0.0f ? o * (2.0f * dot(k.a, o) / o2) - k.a : k.a;
 
-  std::optional<TriangleSample> sample_failed(const Corners& k, Vec3 position) const {
-    return on_triangle(position, normalize(k.a + k.b + k.c), 1.0f / k.solid_angle);
+    const Vec3 along = cut - k.b;
+    const float whole = 0.5f * length_squared(along), part = u.y * whole;  // 1 − cos of the arcs
+    const Vec3 across = normalize(along + k.b * whole);
+    const Vec3 wi = normalize(k.b * (1.0f - part) + across * safe_sqrt(part * (2.0f - part)));
+    return on_triangle(position, wi, 1.0f / k.solid_angle);
   }
 
   // Barycentrics of the direction, clamped into the triangle. [Möller & Trumbore 1997]
