@@ -28,7 +28,10 @@ struct AreaLight {
 
   float area() const { return (ellipse ? 0.25f * kPi : 1.0f) * size_u * size_v * length(cross(u, v)); }
   bool has_shape() const { return area() > 0.0f && tan_spread > 0.0f; }
-  float intensity() const { return scale * area() * (slats ? std::min(tan_spread * slats_norm, 1e4f) : 1.0f); }
+  float intensity() const {
+    constexpr float kMost = 1e4f;  // of a beam without spread
+    return scale * area() * (!slats ? 1.0f : tan_spread > 0.0f ? std::min(tan_spread * slats_norm, kMost) : kMost);
+  }
 
   // Radiance towards −wi per unit of colour.
   float radiance(Vec3, Vec3 wi) const {

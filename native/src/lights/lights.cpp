@@ -253,6 +253,7 @@ struct LightSet::Impl {
     LightSample s;
     s.wi = shape->wi, s.distance = shape->distance, s.pdf_dir = shape->pdf_dir, s.is_delta = shape->is_delta, s.light = light;
     s.radiance = data.color * shape->scale * lamp_program(lamp, query.position, s.wi, s.distance, seen_by_light(query.path, s.distance));
+    if (!is_finite(s.radiance) || !std::isfinite(s.pdf_dir)) return std::nullopt;  // on top of a point
     s.cast_shadow = data.cast_shadow, s.use_mis = data.use_mis && lamp.findable;
     set_scales(s, data.visibility, data.diffuse_factor, data.glossy_factor, data.transmission_factor);
     return s;

@@ -46,10 +46,7 @@ struct SpotLight {
     return s;
   }
 
-  std::optional<float> intersect(const Ray& ray) const {
-    if (dot(ray.direction, ray.origin - point.center) >= 0.0f) return std::nullopt;
-    return point.intersect(ray);
-  }
+  std::optional<float> intersect(const Ray& ray) const { return point.intersect(ray); }
 
   float radiance(Vec3 position, Vec3 wi) const {
     const bool inside = point.sphere && length_squared(point.center - position) <= sqr(point.radius);
