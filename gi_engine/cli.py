@@ -263,9 +263,9 @@ def render_frames(arguments, headless, scene, wishes, display, streams) -> int:
                 raise headless.RenderError(f'scene "{scene.name}" was not rendered: no pass was finished')
             written = target.publish(path, "picture")
         for name in written:
-            print(f"{name}: {best.passes} passes in {duration(best.seconds)}", file=out)
+            display.say(f"{name}: {best.passes} passes in {duration(best.seconds)}", out)
         if wishes.cancelled:
-            print(f"gi-engine: cancelled; the picture has {best.passes} passes", file=err)
+            display.say(f"gi-engine: cancelled; the picture has {best.passes} passes", err)
             return CANCELLED
     return DONE
 

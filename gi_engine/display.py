@@ -54,6 +54,8 @@ def amount(value: float) -> str:
 
 
 def duration(seconds: float) -> str:
+    if seconds < 9.95:
+        return f"{seconds:.1f} s"
     minutes, whole = divmod(int(seconds + 0.5), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{whole:02d}" if hours else f"{minutes:02d}:{whole:02d}"
@@ -94,6 +96,9 @@ class PlainDisplay:
     def begin(self, title: str) -> None:
         self.title = title
 
+    def say(self, text: str, stream) -> None:
+        print(text, file=stream)
+
     def update(self, progress: Progress) -> None:
         if time.monotonic() >= self.next:
             self.next = time.monotonic() + PLAIN_INTERVAL
@@ -130,6 +135,13 @@ class RichDisplay:
         if self.task is not None:
             self.bar.remove_task(self.task)
         self.task = self.bar.add_task(title, total=1.0, details="")
+
+    def say(self, text: str, stream) -> None:
+        """Prints a line on `stream`: above the bar, where that is on the same terminal."""
+        if stream.isatty():
+            self.bar.console.print(text, markup=False, highlight=False, soft_wrap=True)
+        else:
+            print(text, file=stream)
 
     def update(self, progress: Progress) -> None:
         self.bar.update(self.task, completed=min(progress.fraction, 1.0), details=details(progress))

@@ -52,7 +52,7 @@ class Stage:
         return thing
 
 
-def plane(name, corners=((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))):
+def plane(name, corners=((-5, -5, 0), (5, -5, 0), (5, 5, 0), (-5, 5, 0))):
     import bpy
 
     mesh = bpy.data.meshes.new(name)

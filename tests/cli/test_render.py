@@ -1,0 +1,193 @@
+"""`gi-engine render`: what the options do, where files go, how it ends."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from gi_engine import cli
+
+
+def passes_in(done) -> int:
+    return int(re.search(r"(\d+) passes", done.out + done.err)[1])
+
+
+def channels(path) -> dict:
+    """Every channel of every part of an EXR, by name."""
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        return {name: channel.pixels for part in file.parts for name, channel in part.channels.items()}
+
+
+def combined(path) -> np.ndarray:
+    found = channels(path)
+    return np.stack([next(v for k, v in found.items() if k.endswith(f"Combined.{c}")) for c in "RGB"], axis=-1)
+
+
+def png_size(path) -> tuple[int, int]:
+    head = path.read_bytes()[:24]
+    assert head[:8] == b"\x89PNG\r\n\x1a\n"
+    return int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")
+
+
+def test_a_picture(gi, stage, tmp_path):
+    out = tmp_path / "out.png"
+    done = gi("render", stage.save(), "-o", out)
+    assert (done.code, done.err) == (cli.DONE, "")
+    assert png_size(out) == (24, 16)
+    assert passes_in(done) == 4  # the scene's Cycles samples
+    assert sorted(os.listdir(tmp_path)) == ["out.png", "scene.blend"]
+
+
+def test_radiance_of_a_lit_floor(gi, stage, tmp_path):
+    """A point lamp of P watts at height h over a white diffuse floor: rho P / (4 pi^2 h^2) at its foot."""
+    out = tmp_path / "out.exr"
+    stage.lamp.data.shadow_soft_size = 0.0
+    stage.camera.data.angle = 0.01
+    stage.material.use_nodes = True
+    nodes, links = stage.material.node_tree.nodes, stage.material.node_tree.links
+    nodes.clear()
+    diffuse, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
+    diffuse.inputs["Color"].default_value = (0.5, 0.5, 0.5, 1)
+    links.new(diffuse.outputs[0], output.inputs[0])
+    assert gi("render", stage.save(), "-o", out).code == cli.DONE
+    assert combined(out) == pytest.approx(0.5 * 100 / (4 * np.pi**2 * 2**2), rel=2e-3)
+
+
+def test_limits_resolution_integrator_and_parameters(gi, stage, tmp_path):
+    file, out = stage.save(), tmp_path / "out.png"
+    assert passes_in(gi("render", file, "-o", out, "--samples", 7, "--resolution", "31x9")) == 7
+    assert png_size(out) == (31, 9)
+    start = time.monotonic()
+    assert passes_in(gi("render", file, "-o", out, "--time", 0.5)) > 7
+    assert 0.5 < time.monotonic() - start < 10
+    assert gi("render", file, "-o", out, "--integrator", "whitted", "--set", "max_bounces=0").code == cli.DONE
+
+
+def test_a_noise_target_is_met(gi, stage, tmp_path):
+    stage.lamp.data.shadow_soft_size = 1.0
+    file, out = stage.save(), tmp_path / "out.png"
+    loose = passes_in(gi("render", file, "-o", out, "--noise", 0.2))
+    tight = passes_in(gi("render", file, "-o", out, "--noise", 0.02))
+    assert 1 < loose < tight
+
+
+def test_seed_and_threads(gi, stage, tmp_path):
+    stage.lamp.data.shadow_soft_size = 1.0
+    file = stage.save()
+
+    def render(*options):
+        assert gi("render", file, "-o", tmp_path / "out.exr", *options).code == cli.DONE
+        return combined(tmp_path / "out.exr")
+
+    first = render("--seed", 1, "--threads", 1)
+    assert np.array_equal(first, render("--seed", 1, "--threads", 2))
+    assert not np.array_equal(first, render("--seed", 2, "--threads", 2))
+
+
+def test_frames_are_numbered(gi, stage, tmp_path):
+    stage.lamp.data.energy = 10.0
+    stage.lamp.data.keyframe_insert("energy", frame=2)
+    stage.lamp.data.energy = 1000.0
+    stage.lamp.data.keyframe_insert("energy", frame=3)
+    file = stage.save()
+    assert gi("render", file, "-o", tmp_path / "a.exr", "--frame", "2-3").code == cli.DONE
+    assert gi("render", file, "-o", tmp_path / "b_##.exr", "--frame", "3").code == cli.DONE
+    assert sorted(os.listdir(tmp_path)) == ["a0002.exr", "a0003.exr", "b_03.exr", "scene.blend"]
+    assert combined(tmp_path / "a0003.exr").mean() > 20 * combined(tmp_path / "a0002.exr").mean()
+    assert np.array_equal(combined(tmp_path / "a0003.exr"), combined(tmp_path / "b_03.exr"))
+
+
+def test_exr_has_every_pass(gi, stage, tmp_path):
+    layer = stage.scene.view_layers[0]
+    layer.use_pass_z = layer.use_pass_normal = True
+    out = tmp_path / "out.exr"
+    assert gi("render", stage.save(), "-o", out).code == cli.DONE
+    found = channels(out)
+    depth = next(v for k, v in found.items() if "Depth" in k)
+    assert depth == pytest.approx(3.0, rel=1e-4)
+    assert sum("Normal" in name for name in found) == 3
+
+
+def test_png_has_the_view_transform(gi, stage, tmp_path):
+    import bpy
+
+    files = {}
+    for exposure in (0, -3):
+        stage.scene.view_settings.exposure = exposure
+        files[exposure] = stage.save(f"{-exposure}.blend")
+    means = []
+    for file in files.values():
+        assert gi("render", file, "-o", tmp_path / "out.png").code == cli.DONE
+        image = bpy.data.images.load(str(tmp_path / "out.png"))
+        image.colorspace_settings.name = "Non-Color"
+        means.append(np.mean(np.reshape(image.pixels[:], (-1, 4))[:, :3]))
+    assert means[1] == pytest.approx(means[0] * 8 ** (-1 / 2.4), rel=0.1)  # sRGB's curve, but for its foot
+
+
+def test_without_o_the_scene_names_the_file(gi, stage, tmp_path):
+    stage.scene.render.filepath = str(tmp_path / "own_###")
+    stage.scene.render.image_settings.file_format = "JPEG"
+    assert gi("render", stage.save(), "--frame", 5).code == cli.DONE
+    assert sorted(os.listdir(tmp_path)) == ["own_005.jpg", "scene.blend"]
+
+
+@pytest.mark.parametrize("folder", ["with {braces}", "with #hash", "with ünïcode"])
+def test_unusual_folders(gi, stage, tmp_path, folder):
+    (tmp_path / folder).mkdir()
+    out = tmp_path / folder / "out.png"
+    assert gi("render", stage.save(), "-o", out).code == cli.DONE
+    assert out.is_file()
+
+
+def test_an_old_picture_is_replaced_only_by_a_whole_one(gi, stage, tmp_path):
+    out = tmp_path / "out.png"
+    out.write_bytes(b"old")
+    good = stage.save("good.blend")
+    stage.scene.camera = None
+    assert gi("render", stage.save("bad.blend"), "-o", out).code == cli.FAILED
+    assert out.read_bytes() == b"old"
+    assert gi("render", good, "-o", out).code == cli.DONE
+    assert png_size(out) == (24, 16)
+
+
+def test_ctrl_c_keeps_what_is_there(gi, stage, tmp_path):
+    out, file = tmp_path / "out.png", stage.save()
+    timer = threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    start = time.monotonic()
+    done = gi("render", file, "-o", out, "--samples", 9999999)
+    timer.cancel()
+    assert done.code == cli.CANCELLED
+    assert time.monotonic() - start < 4.0
+    assert passes_in(done) > 0
+    assert "cancelled" in done.err
+    assert png_size(out) == (24, 16)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def program(*argv) -> subprocess.Popen:
+    code = "from gi_engine import cli; cli.main()"
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *map(str, argv)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def test_the_program_ends_with_its_exit_codes(stage, tmp_path):
+    file, out = stage.save(), tmp_path / "out.png"
+    good = program("render", file, "-o", out)
+    bad = program("render", file, "-o", tmp_path / "missing" / "out.png")
+    assert good.communicate(timeout=120) == (f"{out}: 4 passes in 0.0 s\n", "")
+    assert "missing" in bad.communicate(timeout=120)[1]
+    assert (good.returncode, bad.returncode) == (cli.DONE, cli.BAD_ARGUMENTS)
+    endless = program("render", file, "-o", out, "--samples", 9999999)
+    time.sleep(8)
+    endless.send_signal(signal.SIGINT)
+    assert "cancelled" in endless.communicate(timeout=60)[1]
+    assert endless.returncode == cli.CANCELLED
