@@ -232,7 +232,10 @@ def render_frames(arguments, headless, scene, wishes, display, streams) -> int:
     headless.use_engine(scene)
     check_parameters(find_integrator(arguments.integrator or scene.gi_engine.integrator), wishes.parameters)
     if arguments.resolution:
-        headless.set_resolution(scene, *arguments.resolution)
+        try:
+            headless.set_resolution(scene, *arguments.resolution)
+        except ValueError as error:
+            raise ArgumentError(f"--resolution: {error}") from error
     if arguments.output is not None:
         headless.set_format(scene, arguments.output.suffix.lower())
     chosen = arguments.frame or range(scene.frame_current, scene.frame_current + 1)

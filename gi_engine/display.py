@@ -29,7 +29,8 @@ def quiet(active: bool = True):
     os.close(nowhere)
     streams = [os.fdopen(os.dup(fd), "w", buffering=1, encoding="utf-8", errors="replace") for fd in saved]
     try:
-        yield tuple(streams)
+        with open(os.devnull, "w") as null, contextlib.redirect_stdout(null), contextlib.redirect_stderr(null):
+            yield tuple(streams)
     finally:
         flush_all()
         for fd, copy, stream in zip((1, 2), saved, streams, strict=True):

@@ -43,8 +43,12 @@ def use_engine(scene: bpy.types.Scene) -> None:
 
 
 def set_resolution(scene: bpy.types.Scene, width: int, height: int) -> None:
-    scene.render.resolution_x, scene.render.resolution_y = width, height
-    scene.render.resolution_percentage = 100
+    """Raises ValueError where Blender cannot: it knows 4 to 65536 pixels, and less as a percentage of that."""
+    factor = 1 if min(width, height) >= 4 else 4
+    if factor * max(width, height) > 65536:
+        raise ValueError(f"Blender cannot make pictures of {width}x{height} pixels")
+    scene.render.resolution_x, scene.render.resolution_y = factor * width, factor * height
+    scene.render.resolution_percentage = 100 // factor
 
 
 def set_format(scene: bpy.types.Scene, suffix: str) -> None:
@@ -88,7 +92,11 @@ def start_render(scene: bpy.types.Scene, write_still: bool) -> None:
         bpy.ops.render.render(write_still=write_still, scene=scene.name)
     except RuntimeError as error:
         errors = control.current.errors if control.current else []
-        raise RenderError("; ".join(errors) or message_of(error)) from error
+        raise RenderError("; ".join(errors) or named(message_of(error), scene)) from error
+
+
+def named(message: str, scene: bpy.types.Scene) -> str:
+    return f'scene "{scene.name}" has no camera' if message == "Cannot render, no camera" else message
 
 
 def escaped(path: str) -> str:

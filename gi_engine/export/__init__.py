@@ -45,7 +45,7 @@ def export(depsgraph, descriptors: list[dict], engine=None, size=None, integrato
     shaders = Shaders(out, depsgraph, warnings)
     world = getattr(view_layer, "world_override", None) or scene.world
     out.world = export_world(world, shaders.world(world) if world else -1)
-    export_lights(out, found, shaders)
+    export_lights(out, found, shaders, warnings)
     export_objects(out, found, shaders, warnings)
     note_unsupported(scene, found, warnings)
     settings = export_settings(scene, view_layer, descriptors, integrator)
@@ -63,12 +63,14 @@ def export_active_camera(engine, depsgraph, width: int, height: int, warnings: W
         raise ExportError(str(error)) from error
 
 
-def export_lights(out: Scene, found: Collected, shaders: Shaders) -> None:
+def export_lights(out: Scene, found: Collected, shaders: Shaders, warnings: Warnings) -> None:
     matrices = stack_matrices([entry[2] for entry in found.lights])
     for (name, light, _, visibility), matrix in zip(found.lights, matrices, strict=True):
         lamp = export_light(name, light, matrix, visibility, shaders.light(light))
         if lamp:
             out.lights.append(lamp)
+            if lamp.kind == "AREA" and 0.0 in lamp.size:
+                warnings.add("the area light has no size and gives no light", name)
 
 
 def export_objects(out: Scene, found: Collected, shaders: Shaders, warnings: Warnings) -> None:

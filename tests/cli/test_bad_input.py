@@ -126,9 +126,9 @@ def test_an_unknown_parameter(refuses, stage):
     refuses(stage.save(), "warmth", "max_bounces", code=cli.BAD_ARGUMENTS, options=("--set", "warmth=3"))
 
 
-def test_no_samples(refuses, stage):
-    refuses_two_lines = cli.run(["render", str(stage.save()), "--samples", "0"])
-    assert refuses_two_lines == cli.BAD_ARGUMENTS
+def test_no_samples(gi, stage, tmp_path):
+    done = gi("render", stage.save(), "-o", tmp_path / "out.png", "--samples", 0)
+    assert (done.code, "--samples" in done.err) == (cli.BAD_ARGUMENTS, True)
 
 
 # Scenes
@@ -159,7 +159,11 @@ def test_no_lights(warns, stage):
     assert np.all(warns(stage.save()) == 0.0)
 
 
-@pytest.mark.parametrize("size", ["1x1", "1x7", "7x1"])
+def test_a_picture_too_long_for_blender(refuses, stage):
+    refuses(stage.save(), "1x60000", code=cli.BAD_ARGUMENTS, options=("--resolution", "1x60000"))
+
+
+@pytest.mark.parametrize("size", ["1x1", "1x7", "7x1", "3x4"])
 def test_pictures_of_one_pixel(gi, stage, tmp_path, size):
     done = gi("render", stage.save(), "-o", tmp_path / "out.exr", "--resolution", size)
     assert (done.code, done.err) == (cli.DONE, "")
@@ -186,12 +190,18 @@ def test_points_without_faces(warns, stage):
     warns(stage.save(), "dust")
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_vertices_that_are_not_finite(warns, stage, value):
+def test_vertices_that_are_not_numbers(warns, stage):
     mesh = plane("broken", ((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)))
-    mesh.vertices[2].co = (value, 0, 0)
+    mesh.vertices[2].co = (float("nan"), 0, 0)
     stage.add("broken", mesh)
     assert np.all(warns(stage.save(), "broken") >= 0)
+
+
+def test_vertices_at_the_end_of_the_number_range(warns, stage):
+    mesh = plane("vast", ((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)))
+    mesh.vertices[2].co = (float("inf"), 0, 0)  # Blender makes it 3.4e38
+    stage.add("vast", mesh)
+    assert np.all(warns(stage.save()) >= 0)
 
 
 def test_triangles_of_no_area(warns, stage):
@@ -199,15 +209,20 @@ def test_triangles_of_no_area(warns, stage):
     warns(stage.save())
 
 
-def test_indices_out_of_range(refuses, stage):
+def test_indices_out_of_range(warns, stage):
     mesh = plane("wild")
     mesh.attributes[".corner_vert"].data[1].value = 1000
     stage.add("wild", mesh)
-    stage.scene.view_layers.update()
-    refuses(stage.save(), "wild")
+    assert warns(stage.save(), "wild").mean() > 0
 
 
-@pytest.mark.parametrize("scale", [(0, 1, 1), (0, 0, 0)])
+def test_a_flattened_object(warns, stage):
+    thing = stage.add("flat", plane("flat"))
+    thing.location.z, thing.scale = 1, (1, 1, 0)
+    assert warns(stage.save()).mean() > 0
+
+
+@pytest.mark.parametrize("scale", [(0, 0, 1), (0, 0, 0)])
 def test_singular_transforms(warns, stage, scale):
     thing = stage.add("squashed", plane("squashed"))
     thing.location.z, thing.scale = 1, scale
@@ -258,7 +273,7 @@ def nodes_of(material):
 def test_a_material_without_output(warns, stage):
     nodes, _ = nodes_of(stage.material)
     nodes.new("ShaderNodeBsdfDiffuse")
-    assert np.all(warns(stage.save(), "grey", "output") == 0.0)
+    assert np.all(warns(stage.save(), "grey", "Material Output") == 0.0)
 
 
 def test_an_output_without_surface(warns, stage):
@@ -292,7 +307,9 @@ def textured(stage, image):
 
 
 def is_magenta(pixels) -> bool:
-    return bool(np.all(pixels[..., 1] == 0) and pixels[..., 0].mean() > 0 and np.allclose(pixels[..., 0], pixels[..., 2]))
+    return bool(
+        np.all(pixels[..., 1] == 0) and pixels[..., 0].mean() > 0 and np.allclose(pixels[..., 0], pixels[..., 2])
+    )
 
 
 def test_a_missing_image(warns, stage):
