@@ -50,7 +50,8 @@ class Instance:
     object_index: int = 0
     random: float = 0.0  # 0..1, Object Info's Random
     holdout: bool = False
-    shadow_terminator_offset: float = 0.0
+    shadow_terminator_offset: float = 0.0  # Blender's Shading Offset
+    shadow_terminator_geometry_offset: float = 0.0
     attributes: dict[str, tuple] = field(default_factory=dict)  # object and instancer attributes: name -> 4 floats
 
 

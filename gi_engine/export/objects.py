@@ -50,6 +50,7 @@ class Prototype:
     random: float
     holdout: bool
     shadow_terminator_offset: float
+    shadow_terminator_geometry_offset: float
     object: object  # bpy Object that object attributes are read from
     parent: object  # bpy Object that instancer attributes are read from; the same where there is none
     is_plain: bool  # a mesh object of its own, with nothing that may take its faces away on purpose
@@ -128,6 +129,7 @@ class Walk:
                 random=random_of_name(item.name),
                 holdout=parent.holdout_get(view_layer=self.view_layer),
                 shadow_terminator_offset=item.shadow_terminator_shading_offset,
+                shadow_terminator_geometry_offset=item.shadow_terminator_geometry_offset,
                 object=lasting,
                 parent=parent,
                 is_plain=lasting == parent and item.type == lasting.type and not lasting.modifiers,
@@ -197,6 +199,7 @@ def place(
                 random=random,
                 holdout=prototype.holdout,
                 shadow_terminator_offset=prototype.shadow_terminator_offset,
+                shadow_terminator_geometry_offset=prototype.shadow_terminator_geometry_offset,
                 attributes=attributes[index],
             )
         )

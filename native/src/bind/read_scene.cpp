@@ -154,6 +154,7 @@ InstanceData read_instance(const Record& r) {
   i.random = r.real("random");
   i.holdout = r.get<bool>("holdout");
   i.shadow_terminator_offset = r.real("shadow_terminator_offset");
+  i.shadow_terminator_geometry_offset = r.real("shadow_terminator_geometry_offset");
   nb::dict attributes = r.get<nb::dict>("attributes");
   for (auto [name, value] : attributes) {
     InstanceAttribute a{nb::cast<std::string>(name), {0, 0, 0, 1}};

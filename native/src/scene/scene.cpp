@@ -10,6 +10,14 @@ namespace {
 // occlusion query settles all that is opaque.
 constexpr uint32_t kTransparentShadowBit = 1u << 16;
 
+// Object space; for meshes that have normals.
+Vec3 corner_normal(const MeshData& mesh, uint32_t triangle, int k) {
+  const int32_t corner = mesh.tri_corner[3 * size_t(triangle) + size_t(k)];
+  const int32_t at = mesh.normals_domain == Domain::kPoint ? mesh.corner_vert[size_t(corner)] : corner;
+  const float* q = mesh.normals.data + 3 * size_t(at);
+  return {q[0], q[1], q[2]};
+}
+
 }  // namespace
 
 Scene::Scene(SceneData data, std::unique_ptr<ShaderResources> resources, const std::string& embree, int threads)
@@ -147,14 +155,9 @@ ShadingPoint Scene::surface_point(uint32_t instance, uint32_t triangle, float b1
   p.ng = normalize_or(placed.mirrored ? -n : n, wo);
   p.ns = p.ng;
   if (mesh.normals_domain != Domain::kFace) {
-    const int32_t* corner = mesh.tri_corner.data + 3 * size_t(triangle);
     const float w[3] = {1.0f - b1 - b2, b1, b2};
     Vec3 sum;
-    for (int k = 0; k < 3; ++k) {
-      const int32_t c = mesh.normals_domain == Domain::kPoint ? mesh.corner_vert[size_t(corner[k])] : corner[k];
-      const float* q = mesh.normals.data + 3 * size_t(c);
-      sum += w[k] * Vec3{q[0], q[1], q[2]};
-    }
+    for (int k = 0; k < 3; ++k) sum += w[k] * corner_normal(mesh, triangle, k);
     p.ns = normalize_or(placed.to_object.transposed_vector(sum), p.ng);
   }
   p.backfacing = dot(p.ng, wo) < 0.0f;
@@ -181,6 +184,33 @@ ShadingPoint Scene::shading_point(const Ray& ray, const Hit& hit, const PathStat
   PathState arrived = path;
   arrived.ray_length = hit.t;
   return surface_point(hit.instance, hit.triangle, hit.b1, hit.b2, -ray.direction, arrived, footprint);
+}
+
+Vec3 Scene::shadow_origin(const ShadingPoint& point, Vec3 wi) const {
+  const Instance& placed = instances_[point.instance];
+  const MeshData& mesh = data_.meshes[placed.mesh];
+  const float cutoff = placed.data->shadow_terminator_geometry_offset;
+  if (!(cutoff > 0.0f) || mesh.normals_domain == Domain::kFace) return point.position;
+  // How near the terminator is: by both normals where light grazes the shading one, fading out towards the cutoff.
+  const float side = dot(point.ns, wi) < 0.0f ? -1.0f : 1.0f;
+  const float cos_shading = side * dot(point.ns, wi), cos_geometric = side * dot(point.ng, wi);
+  const float amount = cos_shading < cutoff ? clamp01(2.0f - (cos_geometric + cos_shading) / cutoff) : clamp01(1.0f - cos_geometric / cutoff);
+  if (amount == 0.0f) return point.position;
+
+  // Height of the parabolic patch whose edges bend as the corner normals say.
+  Vec3 v[3], n[3];
+  triangle_vertices(point.instance, point.triangle, v);
+  const float b[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
+  Vec3 lift;
+  for (int k = 0; k < 3; ++k) {
+    n[k] = normalize(placed.to_object.transposed_vector(corner_normal(mesh, point.triangle, k)));
+    if (dot(n[k], point.ng) * side < 0.0f) n[k] = -n[k];  // towards the side that light comes from
+    lift += b[k] * n[k];
+  }
+  float height = 0.0f;
+  for (int i = 0; i < 3; ++i)
+    for (int j = i + 1; j < 3; ++j) height += b[i] * b[j] * dot(n[j] - n[i], v[j] - v[i]);
+  return point.position + lift * (amount * std::max(height, 0.0f));  // hollow sides are not lifted
 }
 
 ShadingPoint Scene::world_point(Vec3 direction, const PathState& path) const {

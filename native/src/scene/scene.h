@@ -42,6 +42,9 @@ class Scene {
   // The point of triangle `triangle` at barycentrics (b1, b2), seen from direction `wo`: for light sampling and texels.
   ShadingPoint surface_point(uint32_t instance, uint32_t triangle, float b1, float b2, Vec3 wo, const PathState& path,
                              float footprint = 0) const;
+  // Where a shadow ray towards `wi` starts: near the terminator of a smooth-shaded mesh lifted towards the surface that the
+  // normals suggest, or the facets would show in the shadow. [Hanika 2021, "Hacking the shadow terminator"]
+  Vec3 shadow_origin(const ShadingPoint& point, Vec3 wi) const;
   // The world as seen along `direction`.
   ShadingPoint world_point(Vec3 direction, const PathState& path) const;
 

@@ -56,7 +56,7 @@ struct InstanceData {
   int object_index = 0;
   float random = 0;
   bool holdout = false;
-  float shadow_terminator_offset = 0;
+  float shadow_terminator_offset = 0, shadow_terminator_geometry_offset = 0;
   std::vector<InstanceAttribute> attributes;
 };
 

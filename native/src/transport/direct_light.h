@@ -40,7 +40,7 @@ inline LobeEval eval_for_light(const Bsdf& bsdf, Vec3 wo, const LightSample& lig
 // The share of a sampled light that arrives: what lies between is looked at last.
 inline Rgb shadowed(const RenderContext& context, const ShadingPoint& point, const LightSample& light, Rgb contribution) {
   if (!light.cast_shadow || is_black(contribution)) return contribution;
-  const Ray ray{offset_point(point.position, point.ng, light.wi), light.wi, 0.0f,
+  const Ray ray{offset_point(context.scene.shadow_origin(point, light.wi), point.ng, light.wi), light.wi, 0.0f,
                 std::isfinite(light.distance) ? light.distance * (1.0f - 1e-4f) : kInf};
   return contribution * context.scene.transmittance(ray, point.path);
 }
