@@ -1,5 +1,8 @@
 """Lobes: what they sample is what they claim, they are reciprocal where the model is, and they neither make nor lose energy."""
 
+import importlib.util
+from pathlib import Path
+
 import chi2
 import numpy as np
 import pytest
@@ -48,6 +51,14 @@ LOBES = {
 COSINES = [0.97, 0.6, 0.12]
 CASES = [pytest.param(*LOBES[k], c, id=f"{k} at {c}") for k in LOBES for c in COSINES]
 SMOOTH_GLASS = ("ggx_glass", {"alpha": [0.0], **GLASS})
+
+
+def load_tool(name):
+    path = Path(__file__).parents[2] / "native/tools" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def view(cos_o, phi=0.7):
@@ -218,6 +229,45 @@ def test_extremes_stay_finite(name):
             for out in (_core.lobe_sample(name, parameters, wo, corners), _core.lobe_eval(name, parameters, wo, wi)):
                 assert np.isfinite(out).all()
                 assert (out[:, 3:7] >= 0).all()
+
+
+def film_by_spectrum(cos_i, film_ior, thickness, substrate):
+    """Airy's formula at every wavelength, then the channels' sensitivities: what the Fourier sum stands for."""
+    wavelength, rgb = load_tool("make_thin_film_table").sensitivities()
+    cos_film = np.sqrt(1 - (1 - cos_i**2) / film_ior**2)
+    cos_t = np.sqrt(1 - (1 - cos_i**2) / (substrate + 0j) ** 2)
+    delay = np.exp(4j * np.pi * film_ior * thickness * cos_film / wavelength)
+    total = 0
+    for a, b, c in (
+        (cos_i, film_ior * cos_film, substrate * cos_t),
+        (-1 / cos_i, -film_ior / cos_film, -substrate / cos_t),
+    ):
+        r12, r23 = (a - b) / (a + b), (b - c) / (b + c)
+        total = total + 0.5 * abs((r12 + r23 * delay) / (1 + r12 * r23 * delay)) ** 2
+    return total @ rgb
+
+
+@pytest.mark.parametrize("cos_i", [1.0, 0.7, 0.3])
+@pytest.mark.parametrize("thickness", [100, 400, 1000])
+@pytest.mark.parametrize(
+    ("substrate", "parameters"),
+    [
+        (1.5, {"fresnel": SCHLICK, "ior": [1.5]}),
+        (0.2 + 3.4j, {"fresnel": CONDUCTOR, "n": [0.2], "k": [3.4]}),
+    ],
+    ids=["glass", "metal"],
+)
+def test_thin_films_are_airy_sums_over_the_spectrum(cos_i, thickness, substrate, parameters):
+    film = {"alpha": [0.0], "film_thickness": [thickness], "film_ior": [1.33]}
+    s = _core.lobe_sample("ggx_reflection", {**parameters, **film}, view(cos_i), numbers(1))[0, 3:6]
+    assert s == pytest.approx(film_by_spectrum(cos_i, 1.33, thickness, substrate), abs=0.01)
+
+
+def test_a_film_that_vanishes_leaves_the_bare_surface():
+    bare = {"alpha": [0.0], "fresnel": SCHLICK, "ior": [1.5]}
+    thin = {**bare, "film_thickness": [0.11], "film_ior": [1.33]}
+    a, b = (_core.lobe_sample("ggx_reflection", p, view(0.6), numbers(1))[0, 3:6] for p in (bare, thin))
+    assert a == pytest.approx(b, abs=1e-3)
 
 
 MIX = [

@@ -37,7 +37,7 @@ struct Parameters {
   }
 };
 
-Fresnel make_fresnel(const Parameters& p) {
+Fresnel bare_fresnel(const Parameters& p) {
   const float ior = p.f("ior", 1.0f);
   switch (int(p.f("fresnel", 0.0f))) {
     case 1:
@@ -53,6 +53,8 @@ Fresnel make_fresnel(const Parameters& p) {
       return Fresnel::none(ior);
   }
 }
+
+Fresnel make_fresnel(const Parameters& p) { return bare_fresnel(p).with_film(p.f("film_thickness", 0.0f), p.f("film_ior", 1.33f)); }
 
 template <class D>
 Microfacet<D> make_microfacet(const std::string& side, const Parameters& p) {

@@ -28,7 +28,7 @@ inline Vec3 rotated(Vec3 v, Vec3 axis, float angle) {
 }
 
 inline constexpr float kFilmCutoff = 0.1f;  // nanometres under which there is no film
-inline Fresnel with_film(const Fresnel& bare, float /*thickness*/, float /*ior*/) { return bare; }
+inline Fresnel with_film(const Fresnel& bare, float thickness, float ior) { return bare.with_film(thickness, ior); }
 
 struct Anisotropy {
   float alpha_x, alpha_y;

@@ -1,7 +1,8 @@
 // What a microfacet reflects and lets through: the Fresnel models of Blender's BSDF nodes, with their cosine-weighted means.
-// Leaves out polarisation and thin films (see thin_film.h).
+// Leaves out polarisation.
 #pragma once
 #include "core/vec.h"
+#include "shading/lobes/thin_film.h"
 
 namespace gi {
 
@@ -46,6 +47,7 @@ struct Fresnel {
   float ior = 1.0f;  // far side over near side: already inverted on back faces
   Rgb f0{}, f90{};     // kSchlick: reflectance head-on and grazing; kF82: f0 and the edge term b; kConductor: n and k
   Rgb reflection_tint{1.0f}, transmission_tint{1.0f};
+  ThinFilm film{};         // kSchlick along the real curve, kF82, kConductor
   float exponent = -1.0f;  // kSchlick: of (1 − cos); negative: follow the real curve of `ior` from f0 to f90
 
   static Fresnel none(float ior = 1.0f) { return {.ior = ior}; }
@@ -67,6 +69,12 @@ struct Fresnel {
             .exponent = exponent};
   }
 
+  Fresnel with_film(float thickness, float film_ior) const {
+    Fresnel f = *this;
+    f.film = {thickness, film_ior};
+    return f;
+  }
+
   FresnelTerms operator()(float cos_h) const;
   // Mean of the reflectance over the hemisphere: what multiple scattering between facets is coloured by.
   Rgb mean() const;
@@ -78,6 +86,9 @@ struct Fresnel {
  private:
   static Rgb min_one(Rgb c) { return {clamp01(c.r), clamp01(c.g), clamp01(c.b)}; }
   float schlick_weight(float cos_h) const;
+  Rgb film_dielectric(float cos_h) const;
+  Rgb film_f82(float cos_h) const;
+  Rgb film_conductor(float cos_h) const;
   static Rgb f82_mean(Rgb f0, Rgb b) { return lerp(f0, Rgb(1.0f), 1.0f / 21.0f) - b * (1.0f / 126.0f); }
   Rgb conductor_at(float c) const {
     return {fresnel_conductor(c, f0.r, f90.r), fresnel_conductor(c, f0.g, f90.g), fresnel_conductor(c, f0.b, f90.b)};
@@ -94,6 +105,32 @@ inline float Fresnel::schlick_weight(float cos_h) const {
   return std::pow(1.0f - (ior < 1.0f ? cos_t : cos_h), exponent);  // the wider of the two angles
 }
 
+// The head-on colour f0 scales what is reflected, but less so the nearer it is to all: Blender's way, for artists.
+inline Rgb Fresnel::film_dielectric(float cos_h) const {
+  Rgb f = film_reflectance(cos_h, film, ior);
+  const float real = f0_from_ior(ior);
+  if (real <= 1e-5f) return f;
+  for (int i = 0; i < 3; ++i) f[i] *= lerp(1.0f, f0[i] / real, clamp01((1.0f - f[i]) / (1.0f - real)));
+  return f;
+}
+// With n and k of a metal that looks the same head-on and at 82°. [Gulbrandsen 2014, "Artist friendly metallic Fresnel"]
+inline Rgb Fresnel::film_f82(float cos_h) const {
+  const Rgb edge = f82(1.0f / 7.0f, f0, f90);
+  Rgb f;
+  for (int i = 0; i < 3; ++i) {
+    const float r = std::min(f0[i], 0.999f), s = std::sqrt(r);
+    const float n = lerp((1.0f + s) / (1.0f - s), (1.0f - r) / (1.0f + r), edge[i]);
+    const float k = safe_sqrt((r * sqr(n + 1.0f) - sqr(n - 1.0f)) / (1.0f - r));
+    f[i] = film_reflectance(cos_h, film, {n, k, edge[i]}, i);
+  }
+  return f;
+}
+inline Rgb Fresnel::film_conductor(float cos_h) const {
+  Rgb f;
+  for (int i = 0; i < 3; ++i) f[i] = film_reflectance(cos_h, film, {f0[i], f90[i]}, i);
+  return f;
+}
+
 inline FresnelTerms Fresnel::operator()(float cos_h) const {
   switch (model) {
     case Model::kNone:  // only a purely refracting lobe has an index here: it cannot pass total reflection
@@ -104,13 +141,13 @@ inline FresnelTerms Fresnel::operator()(float cos_h) const {
     }
     case Model::kSchlick: {
       if (ior * ior - 1.0f + cos_h * cos_h <= 0.0f) return {exponent < 0.0f ? reflection_tint * f90 : reflection_tint, Rgb()};
-      const Rgb f = lerp(f0, f90, schlick_weight(cos_h));
+      const Rgb f = film && exponent < 0.0f ? film_dielectric(cos_h) : lerp(f0, f90, schlick_weight(cos_h));
       return {f * reflection_tint, (Rgb(1.0f) - f) * transmission_tint};
     }
     case Model::kF82:
-      return {f82(cos_h, f0, f90), Rgb()};
+      return {film ? film_f82(cos_h) : f82(cos_h, f0, f90), Rgb()};
     case Model::kConductor:
-      return {conductor_at(cos_h), Rgb()};
+      return {film ? film_conductor(cos_h) : conductor_at(cos_h), Rgb()};
   }
   return {};
 }

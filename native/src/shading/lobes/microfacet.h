@@ -139,18 +139,21 @@ std::optional<LobeSample> Microfacet<D>::sample(Vec3 wo, Vec2 u, float u_lobe) c
   return LobeSample{wi, e.value, e.pdf_dir, kTransmission | kGlossy, alpha};
 }
 
-// As Blender estimates it (its layers of the Principled BSDF are weighted by this): no loss but Fresnel's.
+// As Blender estimates it (its layers of the Principled BSDF are weighted by this): no loss but Fresnel's, and that of the smooth
+// surface where there is a film.
 template <class D>
 Rgb Microfacet<D>::albedo(Vec3 wo) const {
   const float cos_o = std::max(wo.z, 0.0f);
-  if (fresnel.model == Fresnel::Model::kSchlick) {
+  const bool film(fresnel.film);
+  if (fresnel.model == Fresnel::Model::kSchlick && !film) {
     const float s = fresnel.exponent < 0.0f ? ggx_dielectric_weight(roughness(), cos_o, fresnel.ior)
                                             : ggx_schlick_weight(roughness(), cos_o, fresnel.exponent);
     const Rgb f = lerp(fresnel.f0, fresnel.f90, s);
     return tint *
            ((reflects() ? f * fresnel.reflection_tint : Rgb()) + (transmits() ? (Rgb(1.0f) - f) * fresnel.transmission_tint : Rgb()));
   }
-  if (fresnel.model == Fresnel::Model::kF82) return tint * lerp(fresnel.f0, Rgb(1.0f), ggx_schlick_weight(roughness(), cos_o, 5.0f));
+  if (fresnel.model == Fresnel::Model::kF82 && !film)
+    return tint * lerp(fresnel.f0, Rgb(1.0f), ggx_schlick_weight(roughness(), cos_o, 5.0f));
   if (fresnel.model == Fresnel::Model::kDielectric && fresnel.ior > 1.0f && reflects()) {
     const float f = lerp(f0_from_ior(fresnel.ior), 1.0f, ggx_dielectric_weight(roughness(), cos_o, fresnel.ior));
     return tint * (transmits() ? fresnel.reflection_tint * f + fresnel.transmission_tint * (1.0f - f) : fresnel.reflection_tint * f);
