@@ -17,7 +17,7 @@ def describe(scene: Scene, settings: Settings) -> list[str]:
         f"camera: {named(scene.camera.name)}, {CAMERAS.get(scene.camera.kind, scene.camera.kind)}",
         f"picture: {scene.film.width} x {scene.film.height} pixels{border(scene)}; passes {', '.join(scene.film.passes)}",
         f"integrator: {settings.integrator}, {limits(settings)}",
-        f"objects: {counted(len(scene.instances), 'instance')} of {counted(len(scene.meshes), 'mesh', 'meshes')}",
+        f"objects: {counted(sum(i.count for i in scene.instances), 'instance')} of {counted(len(scene.meshes), 'mesh', 'meshes')}",
         triangles(scene),
         f"lights: {lights(scene)}",
         f"materials: {listed(materials(scene))}",
@@ -57,7 +57,7 @@ def limits(settings: Settings) -> str:
 
 def triangles(scene: Scene) -> str:
     sizes = [len(mesh.tri_corner) for mesh in scene.meshes]
-    placed = sum(sizes[instance.mesh] for instance in scene.instances)
+    placed = sum(sizes[instance.mesh] * instance.count for instance in scene.instances)
     return f"triangles: {sum(sizes):,} stored, {placed:,} placed"
 
 

@@ -41,18 +41,24 @@ class Mesh:
 
 @dataclass
 class Instance:
+    """A mesh in one place, or in n places that differ by nothing but matrix and random."""
+
     name: str
     mesh: int  # index into Scene.meshes
-    matrix: np.ndarray  # (4, 4) float32
+    matrix: np.ndarray  # (4, 4) or (n, 4, 4) float32
     materials: list[int]  # program index of each slot, into Scene.programs; empty slots hold Scene.default_material
     visibility: int = VISIBLE_TO_ALL
     color: tuple = (1.0, 1.0, 1.0, 1.0)
     object_index: int = 0
-    random: float = 0.0  # 0..1, Object Info's Random
+    random: float | np.ndarray = 0.0  # 0..1, Object Info's Random; (n,) float32 for n places
     holdout: bool = False
     shadow_terminator_offset: float = 0.0  # Blender's Shading Offset
     shadow_terminator_geometry_offset: float = 0.0
     attributes: dict[str, tuple] = field(default_factory=dict)  # object and instancer attributes: name -> 4 floats
+
+    @property
+    def count(self) -> int:
+        return 1 if np.ndim(self.matrix) < 3 else len(self.matrix)
 
 
 @dataclass

@@ -47,13 +47,14 @@ class Prototype:
     visibility: int
     color: tuple
     object_index: int
-    random: float
     holdout: bool
     shadow_terminator_offset: float
     shadow_terminator_geometry_offset: float
     object: object  # bpy Object that object attributes are read from
     parent: object  # bpy Object that instancer attributes are read from; the same where there is none
     is_plain: bool  # a mesh object of its own, with nothing that may take its faces away on purpose
+    matrices: list = field(default_factory=list)  # 16 floats an instance
+    randoms: list[int] = field(default_factory=list)  # Blender's number for each; empty where it is not an instance
 
 
 @dataclass
@@ -61,8 +62,6 @@ class Collected:
     """The objects of a view layer, before anything big is read."""
 
     prototypes: list[Prototype] = field(default_factory=list)
-    # One entry an instance: prototype, matrix (16 floats), Random.
-    placed: list[tuple] = field(default_factory=list)
     lights: list[tuple] = field(default_factory=list)  # name, bpy Light, matrix, visibility
     linked: list[str] = field(default_factory=list)  # objects with light linking
 
@@ -72,7 +71,10 @@ def collect(depsgraph, warnings: Warnings) -> Collected:
     walk = Walk(depsgraph.view_layer_eval, warnings)
     for instance in depsgraph.object_instances:
         if instance.show_self:
-            walk.visit(instance)
+            item = instance.object
+            data = item.data
+            if data is not None:
+                walk.visit(instance, item, data)
     return walk.found
 
 
@@ -81,34 +83,36 @@ class Walk:
         self.view_layer = view_layer
         self.warnings = warnings
         self.found = Collected()
-        self.known: dict[tuple, int | None] = {}
+        self.known: dict[tuple, Prototype | None] = {}
 
-    def visit(self, instance) -> None:
-        item = instance.object
-        if item.type == "LIGHT":
+    def visit(self, instance, item, data) -> None:
+        # A million instances come through here; the kind of their data tells what they are at the least cost.
+        kind = data.__class__
+        if kind is bpy.types.Mesh:
+            self.visit_mesh(instance, item, data)
+        elif issubclass(kind, bpy.types.Light):
             visibility = self.visibility(item, instance.parent if instance.is_instance else item)
-            self.found.lights.append((item.name, item.data, matrix_of(instance), visibility))
-        elif item.type == "MESH":
-            self.visit_mesh(instance, item)
+            self.found.lights.append((item.name, data, matrix_of(instance), visibility))
         elif item.type in UNSUPPORTED:
             self.warnings.add(f"{UNSUPPORTED[item.type]} are not supported yet; left out", item.name)
 
-    def visit_mesh(self, instance, item) -> None:
-        is_instance = instance.is_instance
-        # Duplicated objects are temporaries that Blender reuses; the object they were made from lasts.
-        lasting = instance.instance_object if is_instance else item
-        parent = instance.parent if is_instance else item
-        mesh = item.data
-        key = (mesh.as_pointer(), lasting.as_pointer() if lasting else 0, parent.as_pointer())
-        if key not in self.known:
-            self.known[key] = self.add_prototype(item, lasting or parent, parent, mesh)
-        index = self.known[key]
-        if index is None:
-            return
-        random = (instance.random_id & MASK) / MASK if is_instance else self.found.prototypes[index].random
-        self.found.placed.append((index, matrix_of(instance), random))
+    def visit_mesh(self, instance, item, mesh) -> None:
+        if not instance.is_instance:
+            prototype = self.add_prototype(item, item, item, mesh)
+        else:
+            # Duplicated objects are temporaries that Blender reuses; the object they were made from lasts.
+            lasting, parent = instance.instance_object, instance.parent
+            key = (mesh.as_pointer(), lasting.as_pointer() if lasting else 0, parent.as_pointer())
+            try:
+                prototype = self.known[key]
+            except KeyError:
+                prototype = self.known[key] = self.add_prototype(item, lasting or parent, parent, mesh)
+            if prototype:
+                prototype.randoms.append(instance.random_id)
+        if prototype:
+            prototype.matrices.append(matrix_of(instance))
 
-    def add_prototype(self, item, lasting, parent, mesh) -> int | None:
+    def add_prototype(self, item, lasting, parent, mesh) -> Prototype | None:
         """None for what no ray sees."""
         visibility = self.visibility(item, parent)
         if not visibility:
@@ -118,24 +122,22 @@ class Walk:
                 self.warnings.add("particle hair is not supported yet; left out", parent.name)
         override = self.view_layer.material_override
         slots = [override if override else slot.material for slot in item.material_slots] or [override]
-        self.found.prototypes.append(
-            Prototype(
-                name=item.name,
-                mesh=mesh,
-                materials=slots,
-                visibility=visibility,
-                color=tuple(item.color),
-                object_index=item.pass_index,
-                random=random_of_name(item.name),
-                holdout=parent.holdout_get(view_layer=self.view_layer),
-                shadow_terminator_offset=item.shadow_terminator_shading_offset,
-                shadow_terminator_geometry_offset=item.shadow_terminator_geometry_offset,
-                object=lasting,
-                parent=parent,
-                is_plain=lasting == parent and item.type == lasting.type and not lasting.modifiers,
-            )
+        prototype = Prototype(
+            name=item.name,
+            mesh=mesh,
+            materials=slots,
+            visibility=visibility,
+            color=tuple(item.color),
+            object_index=item.pass_index,
+            holdout=parent.holdout_get(view_layer=self.view_layer),
+            shadow_terminator_offset=item.shadow_terminator_shading_offset,
+            shadow_terminator_geometry_offset=item.shadow_terminator_geometry_offset,
+            object=lasting,
+            parent=parent,
+            is_plain=lasting == parent and item.type == lasting.type and not lasting.modifiers,
         )
-        return len(self.found.prototypes) - 1
+        self.found.prototypes.append(prototype)
+        return prototype
 
     def visibility(self, item, parent) -> int:
         seen = ray_visibility(item)
@@ -176,31 +178,39 @@ def place(
     found: Collected, meshes: list[int | None], slots: list[list[int]], attributes: list[dict], warnings: Warnings
 ) -> list[Instance]:
     """Instances of all prototypes that have a mesh; the three lists go by prototype."""
-    if not found.placed:
-        return []
-    matrices = stack_matrices([entry[1] for entry in found.placed])
     instances = []
-    for (index, _, random), matrix, good in zip(found.placed, matrices, usable(matrices).tolist(), strict=True):
-        prototype, mesh = found.prototypes[index], meshes[index]
+    for prototype, mesh, programs, values in zip(found.prototypes, meshes, slots, attributes, strict=True):
         if mesh is None:
             continue
-        if not good:
+        matrices, randoms = stack_matrices(prototype.matrices), randoms_of(prototype)
+        good = usable(matrices)
+        if not good.all():
             warnings.add("its matrix is singular or not finite; left out", prototype.name)
+            matrices, randoms = matrices[good], randoms[good]
+        if not len(matrices):
             continue
+        single = len(matrices) == 1
         instances.append(
             Instance(
                 name=prototype.name,
                 mesh=mesh,
-                matrix=matrix,
-                materials=slots[index],
+                matrix=matrices[0] if single else matrices,
+                materials=programs,
                 visibility=prototype.visibility,
                 color=prototype.color,
                 object_index=prototype.object_index,
-                random=random,
+                random=float(randoms[0]) if single else randoms,
                 holdout=prototype.holdout,
                 shadow_terminator_offset=prototype.shadow_terminator_offset,
                 shadow_terminator_geometry_offset=prototype.shadow_terminator_geometry_offset,
-                attributes=attributes[index],
+                attributes=values,
             )
         )
     return instances
+
+
+def randoms_of(prototype: Prototype) -> np.ndarray:
+    """(n,) float32, 0 to 1: Object Info's Random."""
+    if not prototype.randoms:
+        return np.array([random_of_name(prototype.name)], np.float32)
+    return ((np.array(prototype.randoms, np.int64) & MASK) / MASK).astype(np.float32)

@@ -112,3 +112,9 @@ def named(items, name: str):
     """The exported thing of that name; there must be exactly one."""
     (found,) = [item for item in items if item.name == name]
     return found
+
+
+def places(instance) -> np.ndarray:
+    """(n, 3): where the copies of an instance are, sorted."""
+    matrices = np.reshape(instance.matrix, (-1, 4, 4))
+    return np.array(sorted(matrices[:, :3, 3].tolist()))

@@ -9,7 +9,7 @@ import OpenEXR
 
 
 def read(path: Path) -> dict[str, np.ndarray]:
-    """"Layer.Pass" (and ".view" in stereo) -> (height, width, channels), row 0 at the bottom, channels in the order R G B A, X Y Z, U V A."""
+    """ "Layer.Pass" (and ".view" in stereo) -> (height, width, channels), row 0 at the bottom, channels in the order R G B A, X Y Z, U V A."""
     planes: dict[str, dict[str, np.ndarray]] = {}
     with OpenEXR.File(str(path), separate_channels=True) as file:
         for part in file.parts:

@@ -9,7 +9,7 @@ from mathutils import Matrix
 
 from gi_engine.scene_data import CAMERA, DIFFUSE, SHADOW, VISIBLE_TO_ALL
 
-from .conftest import add, grid, mesh, named
+from .conftest import add, grid, mesh, named, places
 
 
 def material(name: str):
@@ -174,12 +174,10 @@ def test_vertex_instances(scene, render_export):
     leaf = add(scene, "Leaf", mesh())
     leaf.parent = carrier
     exported = render_export()
-    assert {i.name for i in exported.scene.instances} == {"Leaf"}
-    assert len(exported.scene.instances) == len(carrier.data.vertices)
-    placed = np.array(sorted(i.matrix[:3, 3].tolist() for i in exported.scene.instances))
-    expected = np.array(sorted(list(v.co) for v in carrier.data.vertices))
-    np.testing.assert_allclose(placed, expected, atol=1e-6)
-    assert len({i.random for i in exported.scene.instances}) > 20
+    (leaves,) = exported.scene.instances
+    assert leaves.name == "Leaf" and leaves.count == len(carrier.data.vertices)
+    np.testing.assert_allclose(places(leaves), sorted(list(v.co) for v in carrier.data.vertices), atol=1e-6)
+    assert len(set(leaves.random.tolist())) > 20
 
 
 def test_particle_instances(scene, render_export):
@@ -192,8 +190,8 @@ def test_particle_instances(scene, render_export):
     scene.frame_set(1)
     scene.frame_set(2)
     exported = render_export()
-    assert [i.name for i in exported.scene.instances] == ["Seed"] * 50
-    assert len(exported.scene.meshes) == 1
+    (seeds,) = exported.scene.instances
+    assert (seeds.name, seeds.count, len(exported.scene.meshes)) == ("Seed", 50, 1)
 
 
 def geometry_nodes(build):
@@ -215,11 +213,11 @@ def test_geometry_nodes_instances(scene, render_export):
     carrier = add(scene, "Carrier", grid(3), location=(0, 0, 1))
     carrier.modifiers.new("Nodes", "NODES").node_group = geometry_nodes(scatter)
     exported = render_export()
-    assert len(exported.scene.instances) == 16 and len(exported.scene.meshes) == 1
+    (cubes,) = exported.scene.instances
+    assert cubes.count == 16 and len(exported.scene.meshes) == 1
     assert len(exported.scene.meshes[0].tri_corner) == 12
-    placed = np.array(sorted(i.matrix[:3, 3].tolist() for i in exported.scene.instances))
-    expected = np.array(sorted((np.array(v.co) + (0, 0, 1)).tolist() for v in carrier.data.vertices))
-    np.testing.assert_allclose(placed, expected, atol=1e-6)
+    expected = sorted((np.array(v.co) + (0, 0, 1)).tolist() for v in carrier.data.vertices)
+    np.testing.assert_allclose(places(cubes), expected, atol=1e-6)
     assert not exported.warnings
 
 

@@ -63,7 +63,9 @@ def test_pixels_land_where_they_belong(plane, rendered, size):
 
 
 @pytest.mark.parametrize("crop", [False, True])
-@pytest.mark.parametrize("border", [(0.25, 0.75, 0.5, 1.0), (0.1, 0.37, 0.13, 0.71), (0.9, 1.0, 0.0, 0.2), (0.5, 0.6, 0.5, 0.6)])
+@pytest.mark.parametrize(
+    "border", [(0.25, 0.75, 0.5, 1.0), (0.1, 0.37, 0.13, 0.71), (0.9, 1.0, 0.0, 0.2), (0.5, 0.6, 0.5, 0.6)]
+)
 def test_borders_land_where_they_belong(plane, rendered, border, crop):
     width, height = 61, 43
     render = plane.render
@@ -109,7 +111,9 @@ def test_every_pass_arrives_under_blenders_name(plane, rendered):
     for p in PASSES:
         assert found[f"ViewLayer.{p.blender_name}"].shape[2] == len(p.channels), p.name
     np.testing.assert_allclose(found["ViewLayer.Depth"], 5, rtol=1e-5)
-    np.testing.assert_allclose(found["ViewLayer.Normal"], np.broadcast_to((0, 0, 1), found["ViewLayer.Normal"].shape), atol=1e-6)
+    np.testing.assert_allclose(
+        found["ViewLayer.Normal"], np.broadcast_to((0, 0, 1), found["ViewLayer.Normal"].shape), atol=1e-6
+    )
     np.testing.assert_allclose(found["ViewLayer.Denoising Albedo"], 0.8, rtol=1e-5)
     np.testing.assert_array_equal(found["ViewLayer.Debug Sample Count"], 2)
     assert set(engine.passes_of(layer)) == set(PASSES)

@@ -59,11 +59,17 @@ struct Record {
     throw InputError(who + ": '" + field + "' must be one of " + valid + ", not '" + id + "'");
   }
   Affine matrix(const char* field) const {
-    const auto a = array<const float>(field, true);  // small: any number type will do
-    require(a.size == 16, who + ": '" + field + "' must be a 4 x 4 matrix");
-    Affine m;
-    for (size_t i = 0; i < 12; ++i) m.m[i / 4][i % 4] = a[i];
-    return m;
+    const auto all = matrices(field);
+    require(all.size() == 1, who + ": '" + field + "' must be a 4 x 4 matrix");
+    return all[0];
+  }
+  std::vector<Affine> matrices(const char* field) const {
+    const auto a = array<const float>(field, true);  // any number type will do
+    require(a.size % 16 == 0, who + ": '" + field + "' must hold 4 x 4 matrices");
+    std::vector<Affine> all(a.size / 16);
+    for (size_t k = 0; k < all.size(); ++k)
+      for (size_t i = 0; i < 12; ++i) all[k].m[i / 4][i % 4] = a[16 * k + i];
+    return all;
   }
   // A contiguous array of any shape; None is empty.
   template <class T>
@@ -141,17 +147,16 @@ MeshData read_mesh(const Record& r) {
   return m;
 }
 
-InstanceData read_instance(const Record& r) {
+// A record stands for as many instances as it has matrices.
+void read_instances(const Record& r, std::vector<InstanceData>& all) {
   InstanceData i;
   i.name = r.get<std::string>("name");
   i.mesh = r.get<uint32_t>("mesh");
-  i.matrix = r.matrix("matrix");
   i.materials = r.get<std::vector<int32_t>>("materials");
   i.visibility = r.get<uint32_t>("visibility");
   const auto color = r.reals("color", 4);
   std::copy(color.begin(), color.end(), i.color);
   i.object_index = r.get<int>("object_index");
-  i.random = r.real("random");
   i.holdout = r.get<bool>("holdout");
   i.shadow_terminator_offset = r.real("shadow_terminator_offset");
   i.shadow_terminator_geometry_offset = r.real("shadow_terminator_geometry_offset");
@@ -161,7 +166,16 @@ InstanceData read_instance(const Record& r) {
     for (size_t k = 0; k < 4; ++k) a.value[k] = float(nb::cast<double>(nb::float_(nb::object(value[nb::int_(k)]))));
     i.attributes.push_back(a);
   }
-  return i;
+  const std::vector<Affine> matrices = r.matrices("matrix");
+  const bool many = nb::hasattr(r.at("random"), "shape");
+  const Array<const float> randoms = many ? r.array<const float>("random", true) : Array<const float>{};
+  require(!many || randoms.size == matrices.size(), r.who + ": 'random' must have one number for each matrix");
+  if (!many) i.random = r.real("random");
+  for (size_t k = 0; k < matrices.size(); ++k) {
+    i.matrix = matrices[k];
+    if (many) i.random = randoms[k];
+    all.push_back(i);
+  }
 }
 
 LampData read_lamp(const Record& r) {
@@ -208,7 +222,7 @@ SceneData read_scene(nb::handle scene) {
   const Record r{nb::borrow(scene), "the scene"};
   SceneData d;
   for (const Record& m : r.list("meshes", "mesh")) d.meshes.push_back(read_mesh(m));
-  for (const Record& i : r.list("instances", "object")) d.instances.push_back(read_instance(i));
+  for (const Record& i : r.list("instances", "object")) read_instances(i, d.instances);
   for (const Record& l : r.list("lights", "light")) d.lamps.push_back(read_lamp(l));
   for (const Record& p : r.list("programs", "material")) d.materials.push_back(read_program(p));
   d.attribute_names = r.get<std::vector<std::string>>("attribute_names");
