@@ -5,10 +5,12 @@
 #include "shading/resources.h"
 #include "shading/textures/brick.h"
 #include "shading/textures/checker.h"
+#include "shading/textures/gabor.h"
 #include "shading/textures/gradient.h"
 #include "shading/textures/magic.h"
 #include "shading/textures/noise.h"
 #include "shading/textures/projection.h"
+#include "shading/textures/voronoi.h"
 #include "shading/textures/wave.h"
 
 namespace gi {
@@ -36,6 +38,35 @@ void white_noise(const Operands& a, ShadeState&) {
     const Point<N> p = coordinates<N>(a.v(2), a.f(3));
     a.set(0, hash_value(p)), a.set(1, hash_rgb(p));
   });
+}
+
+// voronoi(distance or radius, colour, position, w; vector, w, scale, detail, roughness, lacunarity, smoothness, exponent,
+//         randomness; dimensions, VoronoiFeature, VoronoiMetric, normalize)
+void voronoi(const Operands& a, ShadeState&) {
+  VoronoiSettings s;
+  const float scale = a.f(6);
+  s.detail = std::clamp(a.f(7), 0.0f, 15.0f), s.roughness = clamp01(a.f(8)), s.lacunarity = a.f(9);
+  s.smoothness = std::clamp(a.f(10) * 0.5f, 0.0f, 0.5f), s.exponent = a.f(11), s.randomness = clamp01(a.f(12));
+  s.feature = VoronoiFeature(a.imm(14)), s.metric = VoronoiMetric(a.imm(15)), s.normalize = a.imm(16) != 0;
+  with_dimensions(a.imm(13), [&]<int N>() {
+    const VoronoiSample<N> v = voronoi_texture(coordinates<N>(a.v(4), a.f(5)) * scale, s);
+    const Point<N> p = map(v.position, [scale](float x) { return safe_divide(x, scale); });
+    Vec3 position;
+    for (int d = 0; d < std::min(N, 3) && N != 1; ++d) position[d] = p[d];
+    a.set(0, v.distance), a.set(1, v.color), a.set(2, position), a.set(3, N == 1 || N == 4 ? p[N - 1] : 0.0f);
+  });
+}
+
+// gabor(value, phase, intensity; vector, scale, frequency, anisotropy, orientation 2D, orientation 3D; dimensions)
+void gabor_texture(const Operands& a, ShadeState&) {
+  const Gabor g = gabor(a.v(3) * a.f(4), a.imm(9), a.f(5), a.f(6), a.f(7), a.v(8));
+  a.set(0, g.value), a.set(1, g.phase), a.set(2, g.intensity);
+}
+
+// affine(result; vector, three rows of the matrix, translation): the Texture Mapping of old files
+void affine(const Operands& a, ShadeState&) {
+  const Vec3 p = a.v(1);
+  a.set(0, Vec3{dot(a.v(2), p), dot(a.v(3), p), dot(a.v(4), p)} + a.v(5));
 }
 
 // checker(colour, value; vector, colour 1, colour 2, scale)
@@ -117,6 +148,9 @@ void environment_texture(const Operands& a, ShadeState& s) {
 constexpr Op kTextureOps[] = {
     {"noise", "fv", "vffffffff", 4, OpKind::kPure, noise},
     {"white_noise", "fv", "vf", 1, OpKind::kPure, white_noise},
+    {"voronoi", "fvvf", "vffffffff", 4, OpKind::kPure, voronoi},
+    {"gabor", "fff", "vffffv", 1, OpKind::kPure, gabor_texture},
+    {"affine", "v", "vvvvv", 0, OpKind::kPure, affine},
     {"checker", "vf", "vvvf", 0, OpKind::kPure, checker_texture},
     {"gradient", "f", "v", 1, OpKind::kPure, gradient_texture},
     {"brick", "vf", "vvvvffffffff", 2, OpKind::kPure, brick_texture},

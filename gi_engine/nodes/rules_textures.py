@@ -1,0 +1,201 @@
+"""Rules of the texture nodes. Where no Vector is linked, images look at the active UV map and the others at Generated,
+as in Cycles. Enums become immediates; their numbers are those of native/src/shading/textures.
+"""
+
+from __future__ import annotations
+
+from ..export.images import image_key, read_image
+from .program import COLOR, VECTOR
+from .rules import rule
+from .sky import sky_texture
+
+DIMENSIONS = {"1D": 1, "2D": 2, "3D": 3, "4D": 4}
+FRACTALS = {"MULTIFRACTAL": 0, "FBM": 1, "HYBRID_MULTIFRACTAL": 2, "RIDGED_MULTIFRACTAL": 3, "HETERO_TERRAIN": 4}
+GRADIENTS = {"LINEAR": 0, "QUADRATIC": 1, "EASING": 2, "DIAGONAL": 3, "RADIAL": 4, "QUADRATIC_SPHERE": 5, "SPHERICAL": 6}
+WAVES = {"BANDS": 0, "RINGS": 1}
+DIRECTIONS = {"X": 0, "Y": 1, "Z": 2, "DIAGONAL": 3, "SPHERICAL": 3}
+PROFILES = {"SIN": 0, "SAW": 1, "TRI": 2}
+FEATURES = {"F1": 0, "F2": 1, "SMOOTH_F1": 2, "DISTANCE_TO_EDGE": 3, "N_SPHERE_RADIUS": 4}
+METRICS = {"EUCLIDEAN": 0, "MANHATTAN": 1, "CHEBYCHEV": 2, "MINKOWSKI": 3}
+INTERPOLATIONS = {"Closest": 0, "Linear": 1, "Cubic": 2, "Smart": 2}
+EXTENSIONS = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}
+PROJECTIONS = {"FLAT": 0, "SPHERE": 1, "TUBE": 2}
+ENVIRONMENTS = {"EQUIRECTANGULAR": 0, "MIRROR_BALL": 1}
+
+
+def vector(b, default):
+    """The Vector input after the node's own mapping (the sidebar's Texture Mapping of old files)."""
+    source = b.input("Vector", VECTOR) if b.linked("Vector") else default(b)
+    rows = mapping_rows(getattr(b.node, "texture_mapping", None))
+    return source if rows is None else b.op("affine", source, *rows)
+
+
+def generated(b):
+    return b.op("generated")
+
+
+def active_uv(b):
+    return b.op("uv", imm=(b.attribute(""),))
+
+
+def mapping_rows(mapping):
+    """What a TexMapping does, as three rows and a translation; None where it does nothing."""
+    from mathutils import Euler, Matrix
+
+    if mapping is None:
+        return None
+    axes = {"NONE": None, "X": 0, "Y": 1, "Z": 2}
+    picks = [axes[getattr(mapping, f"mapping_{a}")] for a in "xyz"]
+    swizzle = Matrix([[1.0 if pick == column else 0.0 for column in range(3)] for pick in picks])
+    size = [s if mapping.vector_type != "TEXTURE" or abs(s) > 1e-5 else (-1e-5 if s < 0 else 1e-5) for s in mapping.scale]
+    scale, rotation = Matrix.Diagonal(size), Euler(mapping.rotation).to_matrix()
+    move = Matrix.Translation(mapping.translation)
+    if mapping.vector_type == "TEXTURE":
+        matrix = (move @ (rotation @ scale).to_4x4()).inverted_safe()
+    elif mapping.vector_type == "POINT":
+        matrix = move @ (rotation @ scale).to_4x4()
+    elif mapping.vector_type == "VECTOR":
+        matrix = (rotation @ scale).to_4x4()
+    else:
+        matrix = (rotation @ scale.inverted_safe()).to_4x4()
+    matrix = matrix @ swizzle.to_4x4()
+    if matrix == Matrix.Identity(4):
+        return None
+    return [tuple(row)[:3] for row in matrix[:3]] + [tuple(matrix.translation)]
+
+
+# -------------------------------------------------------------------- procedural
+
+
+@rule("ShaderNodeTexNoise")
+def noise(b):
+    n = b.node
+    imm = (DIMENSIONS[n.noise_dimensions], FRACTALS[n.noise_type], n.normalize, b.wants("Color"))
+    inputs = [b.input(name) for name in ("W", "Scale", "Detail", "Roughness", "Lacunarity", "Offset", "Gain", "Distortion")]
+    value, color = b.op("noise", vector(b, generated), *inputs, imm=imm, kind=COLOR)
+    b.output("Fac", value)
+    b.output("Color", color)
+
+
+@rule("ShaderNodeTexWhiteNoise")
+def white_noise(b):
+    value, color = b.op("white_noise", b.input("Vector"), b.input("W"), imm=(DIMENSIONS[b.node.noise_dimensions],), kind=COLOR)
+    b.output("Value", value)
+    b.output("Color", color)
+
+
+@rule("ShaderNodeTexVoronoi")
+def voronoi(b):
+    n = b.node
+    imm = (DIMENSIONS[n.voronoi_dimensions], FEATURES[n.feature], METRICS[n.distance], n.normalize)
+    names = ("W", "Scale", "Detail", "Roughness", "Lacunarity", "Smoothness", "Exponent", "Randomness")
+    distance, color, position, w = b.op("voronoi", vector(b, generated), *(b.input(name) for name in names), imm=imm)
+    b.output("Distance", distance)
+    b.output("Radius", distance)
+    b.output("Color", b.as_kind(color, COLOR))
+    b.output("Position", position)
+    b.output("W", w)
+
+
+@rule("ShaderNodeTexGabor")
+def gabor(b):
+    inputs = [b.input(name) for name in ("Scale", "Frequency", "Anisotropy", "Orientation 2D", "Orientation 3D")]
+    value, phase, intensity = b.op("gabor", vector(b, generated), *inputs, imm=(DIMENSIONS[b.node.gabor_type],))
+    b.output("Value", value)
+    b.output("Phase", phase)
+    b.output("Intensity", intensity)
+
+
+@rule("ShaderNodeTexChecker")
+def checker(b):
+    color, value = b.op("checker", vector(b, generated), b.input("Color1"), b.input("Color2"), b.input("Scale"), kind=COLOR)
+    b.output("Color", color)
+    b.output("Fac", value)
+
+
+@rule("ShaderNodeTexGradient")
+def gradient(b):
+    grey(b, b.op("gradient", vector(b, generated), imm=(GRADIENTS[b.node.gradient_type],)))
+
+
+@rule("ShaderNodeTexWave")
+def wave(b):
+    n = b.node
+    direction = n.bands_direction if n.wave_type == "BANDS" else n.rings_direction
+    names = ("Scale", "Distortion", "Detail", "Detail Scale", "Detail Roughness", "Phase Offset")
+    imm = (WAVES[n.wave_type], DIRECTIONS[direction], PROFILES[n.wave_profile])
+    grey(b, b.op("wave", vector(b, generated), *(b.input(name) for name in names), imm=imm))
+
+
+def grey(b, value):
+    b.output("Fac", value)
+    b.output("Color", b.as_kind(value, COLOR))
+
+
+@rule("ShaderNodeTexMagic")
+def magic(b):
+    color, value = b.op(
+        "magic", vector(b, generated), b.input("Scale"), b.input("Distortion"), imm=(b.node.turbulence_depth,), kind=COLOR
+    )
+    b.output("Color", color)
+    b.output("Fac", value)
+
+
+@rule("ShaderNodeTexBrick")
+def brick(b):
+    n = b.node
+    names = ("Color1", "Color2", "Mortar", "Scale", "Mortar Size", "Mortar Smooth", "Bias", "Brick Width", "Row Height")
+    inputs = [b.input(name) for name in names]
+    imm = (n.offset_frequency, n.squash_frequency)
+    color, mortar = b.op("brick", vector(b, generated), *inputs, n.offset, n.squash, imm=imm, kind=COLOR)
+    b.output("Color", color)
+    b.output("Fac", mortar)
+
+
+# -------------------------------------------------------------------- images
+
+
+def load_image(b) -> int:
+    image, user = b.node.image, b.node.image_user
+    return b.image(image_key(image, user), lambda: read_image(image, b.warn, user))
+
+
+@rule("ShaderNodeTexImage")
+def image(b):
+    n = b.node
+    if n.image is None:
+        return no_image(b, "magenta")
+    lookup = (INTERPOLATIONS[n.interpolation], EXTENSIONS[n.extension], b.wants("Alpha"))
+    number = load_image(b)
+    if n.projection == "BOX":
+        color, alpha = b.op("image_box", vector(b, active_uv), n.projection_blend, imm=(number, *lookup), kind=COLOR)
+    else:
+        color, alpha = b.op("image", vector(b, active_uv), imm=(number, PROJECTIONS[n.projection], *lookup), kind=COLOR)
+    b.output("Color", color)
+    b.output("Alpha", alpha)
+
+
+@rule("ShaderNodeTexEnvironment")
+def environment(b):
+    n = b.node
+    if n.image is None:
+        return no_image(b, "magenta")
+    imm = (load_image(b), ENVIRONMENTS[n.projection], INTERPOLATIONS[n.interpolation])
+    color, _alpha = b.op("environment", vector(b, direction), imm=imm, kind=COLOR)
+    b.output("Color", color)
+
+
+def direction(b):
+    return b.op("position")
+
+
+def no_image(b, what: str) -> None:
+    """Blender shows nodes that have no image black, with alpha 0 (what is missing is magenta)."""
+    b.warn("has no image and gives black")
+    b.output("Color", b.constant(0.0, 0.0, 0.0, kind=COLOR))
+    b.output("Alpha", b.constant(0.0))
+
+
+@rule("ShaderNodeTexSky")
+def sky(b):
+    b.output("Color", sky_texture(b, vector(b, generated)))
