@@ -10,6 +10,7 @@
 #include "shading/textures/magic.h"
 #include "shading/textures/noise.h"
 #include "shading/textures/projection.h"
+#include "shading/textures/sky.h"
 #include "shading/textures/voronoi.h"
 #include "shading/textures/wave.h"
 
@@ -107,6 +108,12 @@ void magic_texture(const Operands& a, ShadeState&) {
 enum class Projection { kFlat, kSphere, kTube };
 enum class EnvironmentProjection { kEquirectangular, kMirrorBall };
 
+// Magenta where there are no images at all, as for one that is missing.
+Texel lookup(const ShadeState& s, int image, Vec2 uv, Interpolation interpolation, Extension extension, bool unassociate) {
+  static const ImageSet none;
+  const ImageSet& images = s.resources.images ? *s.resources.images : none;
+  return images.lookup(image, uv, interpolation, extension, unassociate);
+}
 void set_texel(const Operands& a, const Texel& t) { a.set(0, t.color), a.set(1, t.alpha); }
 
 // image(colour, alpha; vector; image, Projection, Interpolation, Extension, unassociate)
@@ -115,7 +122,7 @@ void image_texture(const Operands& a, ShadeState& s) {
   Vec2 uv{p.x, p.y};
   if (Projection(a.imm(4)) == Projection::kSphere) uv = project_to_sphere(p);
   if (Projection(a.imm(4)) == Projection::kTube) uv = project_to_tube(p);
-  set_texel(a, s.resources.images->lookup(a.imm(3), uv, Interpolation(a.imm(5)), Extension(a.imm(6)), a.imm(7) != 0));
+  set_texel(a, lookup(s, a.imm(3), uv, Interpolation(a.imm(5)), Extension(a.imm(6)), a.imm(7) != 0));
 }
 
 // The shading normal in the object's own space, as Box projection needs it.
@@ -132,7 +139,7 @@ void image_box_texture(const Operands& a, ShadeState& s) {
   Texel sum{Rgb(), 0};
   for (int i = 0; i < 3; ++i) {
     if (weights[i] <= 0.0f) continue;
-    const Texel t = s.resources.images->lookup(a.imm(4), uv[i], Interpolation(a.imm(5)), Extension(a.imm(6)), a.imm(7) != 0);
+    const Texel t = lookup(s, a.imm(4), uv[i], Interpolation(a.imm(5)), Extension(a.imm(6)), a.imm(7) != 0);
     sum.color += weights[i] * t.color, sum.alpha += weights[i] * t.alpha;
   }
   set_texel(a, sum);
@@ -142,7 +149,29 @@ void image_box_texture(const Operands& a, ShadeState& s) {
 void environment_texture(const Operands& a, ShadeState& s) {
   const bool ball = EnvironmentProjection(a.imm(4)) == EnvironmentProjection::kMirrorBall;
   const Vec2 uv = ball ? direction_to_mirror_ball(a.v(2)) : direction_to_equirectangular(a.v(2));
-  set_texel(a, s.resources.images->lookup(a.imm(3), uv, Interpolation(a.imm(5)), Extension::kRepeat, false));
+  set_texel(a, lookup(s, a.imm(3), uv, Interpolation(a.imm(5)), Extension::kRepeat, false));
+}
+
+// Reads a struct of floats from the program's tables.
+template <class T>
+T from_table(const ShadeState& s, int offset) {
+  T value;
+  std::memcpy(&value, s.tables + offset, sizeof(T));
+  return value;
+}
+
+// sky(colour; direction; image, offset of a SkyDisc)
+void sky_texture(const Operands& a, ShadeState& s) {
+  const Vec3 d = normalize_or(a.v(1), {0, 0, 1});
+  const SkyDisc disc = from_table<SkyDisc>(s, a.imm(3));
+  const Rgb sky = lookup(s, a.imm(2), sky_coordinates(d, disc.rotation), Interpolation::kLinear, Extension::kExtend, false).color;
+  const Rgb sum = sky + sun_disc(d, disc);
+  a.set(0, Rgb{std::max(sum.r, 0.0f), std::max(sum.g, 0.0f), std::max(sum.b, 0.0f)});
+}
+
+// sky_preetham(colour; direction; offset of a PreethamSky)
+void preetham_texture(const Operands& a, ShadeState& s) {
+  a.set(0, preetham(normalize_or(a.v(1), {0, 0, 1}), from_table<PreethamSky>(s, a.imm(2))));
 }
 
 constexpr Op kTextureOps[] = {
@@ -159,6 +188,8 @@ constexpr Op kTextureOps[] = {
     {"image", "vf", "v", 5, OpKind::kContext, image_texture},
     {"image_box", "vf", "vf", 4, OpKind::kContext, image_box_texture},
     {"environment", "vf", "v", 3, OpKind::kContext, environment_texture},
+    {"sky", "v", "v", 2, OpKind::kContext, sky_texture},
+    {"sky_preetham", "v", "v", 1, OpKind::kContext, preetham_texture},
 };
 
 }  // namespace
