@@ -4,11 +4,11 @@ as in Cycles. Enums become immediates; their numbers are those of native/src/sha
 
 from __future__ import annotations
 
-from ..export.images import image_key, read_image
 from .program import COLOR, VECTOR
 from .rules import rule
 from .sky import sky_texture
 
+UNDEFORMED = ".undeformed"  # as export.mesh names it
 DIMENSIONS = {"1D": 1, "2D": 2, "3D": 3, "4D": 4}
 FRACTALS = {"MULTIFRACTAL": 0, "FBM": 1, "HYBRID_MULTIFRACTAL": 2, "RIDGED_MULTIFRACTAL": 3, "HETERO_TERRAIN": 4}
 GRADIENTS = {"LINEAR": 0, "QUADRATIC": 1, "EASING": 2, "DIAGONAL": 3, "RADIAL": 4, "QUADRATIC_SPHERE": 5, "SPHERICAL": 6}
@@ -31,7 +31,7 @@ def vector(b, default):
 
 
 def generated(b):
-    return b.op("generated")
+    return b.op("generated", imm=(b.attribute(UNDEFORMED),))
 
 
 def active_uv(b):
@@ -156,6 +156,8 @@ def brick(b):
 
 
 def load_image(b) -> int:
+    from ..export.images import image_key, read_image  # needs bpy
+
     image, user = b.node.image, b.node.image_user
     return b.image(image_key(image, user), lambda: read_image(image, b.warn, user))
 

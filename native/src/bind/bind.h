@@ -11,6 +11,7 @@ namespace gi::bind {
 void bind_render(nanobind::module_& m);
 void bind_shading(nanobind::module_& m);
 void bind_lobes(nanobind::module_& m);
+void bind_images(nanobind::module_& m);
 void bind_bsdf(nanobind::module_& m);
 void bind_lights(nanobind::module_& m);
 

@@ -156,7 +156,7 @@ void environment_texture(const Operands& a, ShadeState& s) {
 template <class T>
 T from_table(const ShadeState& s, int offset) {
   T value;
-  std::memcpy(&value, s.tables + offset, sizeof(T));
+  std::memcpy(static_cast<void*>(&value), s.tables + offset, sizeof(T));
   return value;
 }
 

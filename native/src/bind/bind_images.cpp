@@ -1,10 +1,12 @@
-// Reading scene_data.Image tiles: shapes and dtypes are checked here, pixels are shared with NumPy.
+// Images for Python: reading scene_data.Image tiles (shapes and dtypes are checked here, pixels are shared with NumPy), making
+// bytes of floats, and the tables of sky models.
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 
 #include "bind/bind.h"
 #include "core/check.h"
 #include "shading/images.h"
+#include "shading/sky/sky.h"
 
 namespace nb = nanobind;
 
@@ -51,7 +53,44 @@ Image read_image(nb::handle tiles) {
   return image;
 }
 
+using Floats = nb::ndarray<const float, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Bytes = nb::ndarray<uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+void quantize(Floats values, Bytes out) {
+  require(values.size() == out.size(), "quantize: both arrays must have the same size");
+  const float* from = values.data();
+  uint8_t* to = out.data();
+  const size_t n = values.size();
+  const nb::gil_scoped_release release;
+  for (size_t i = 0; i < n; ++i) to[i] = uint8_t(int(std::min(std::max(from[i], 0.0f), 1.0f) * 255.0f + 0.5f));
+}
+
+// (H, W, 4) float32 pixels, and the sun's radiance at the lower and the upper edge of its disc.
+nb::tuple sky(bool multiple, float sun_elevation, float sun_size, float altitude, float air, float aerosol, float ozone) {
+  const Atmosphere a{altitude, air, aerosol, ozone};
+  SunDisc sun;
+  std::vector<float>* pixels = nullptr;
+  SkyTable table;
+  {
+    const nb::gil_scoped_release release;
+    table = multiple ? multiple_scattering_sky(sun_elevation, a) : single_scattering_sky(sun_elevation, a);
+    sun = multiple ? multiple_scattering_sun(sun_elevation, sun_size, a) : single_scattering_sun(sun_elevation, sun_size, a);
+    pixels = new std::vector<float>();
+    pixels->reserve(table.pixels.size() * 4);
+    for (const Rgb& c : table.pixels) pixels->insert(pixels->end(), {c.r, c.g, c.b, 1.0f});
+  }
+  nb::capsule owner(pixels, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+  nb::ndarray<nb::numpy, float> array(pixels->data(), {size_t(table.height), size_t(table.width), 4}, owner);
+  return nb::make_tuple(array, nb::make_tuple(sun.bottom.r, sun.bottom.g, sun.bottom.b), nb::make_tuple(sun.top.r, sun.top.g, sun.top.b));
+}
+
 }  // namespace
+
+void bind_images(nb::module_& m) {
+  m.def("quantize", quantize, nb::arg("values"), nb::arg("out"), "Writes floats of [0, 1] as bytes, rounded; both arrays are flat.");
+  m.def("sky", sky, nb::arg("multiple"), nb::arg("sun_elevation"), nb::arg("sun_size"), nb::arg("altitude"), nb::arg("air"),
+        nb::arg("aerosol"), nb::arg("ozone"), "The table of a sky model, (H, W, 4) float32, and the sun's radiance at its lower and upper edge.");
+}
 
 std::unique_ptr<ShaderResources> read_resources(nb::handle scene) {
   std::vector<Image> images;
