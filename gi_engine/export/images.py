@@ -198,7 +198,9 @@ def sequence_path(path: str, frame: int) -> str:
     if not found:
         return path
     name = os.path.basename(path)
-    return os.path.join(os.path.dirname(path), name[: found.start(1)] + str(frame).zfill(len(found.group(1))) + found.group(2))
+    return os.path.join(
+        os.path.dirname(path), name[: found.start(1)] + str(frame).zfill(len(found.group(1))) + found.group(2)
+    )
 
 
 def tile_path(path: str, number: int) -> str:

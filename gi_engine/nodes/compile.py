@@ -13,7 +13,7 @@ from ..scene_data import Program, Scene
 from .program import COLOR, FLOAT, VECTOR, ProgramBuilder, Value
 from .rules import CLOSURE_RULES, RULES
 
-for _family in ("closures",):
+for _family in ("closures", "textures"):
     importlib.import_module(f"{__package__}.rules_{_family}")
 
 KIND_OF_SOCKET = {"VALUE": FLOAT, "INT": FLOAT, "BOOLEAN": FLOAT, "VECTOR": VECTOR, "ROTATION": VECTOR, "RGBA": COLOR}

@@ -4,6 +4,8 @@ as in Cycles. Enums become immediates; their numbers are those of native/src/sha
 
 from __future__ import annotations
 
+import numpy as np
+
 from .program import COLOR, VECTOR
 from .rules import rule
 from .sky import sky_texture
@@ -11,7 +13,15 @@ from .sky import sky_texture
 UNDEFORMED = ".undeformed"  # as export.mesh names it
 DIMENSIONS = {"1D": 1, "2D": 2, "3D": 3, "4D": 4}
 FRACTALS = {"MULTIFRACTAL": 0, "FBM": 1, "HYBRID_MULTIFRACTAL": 2, "RIDGED_MULTIFRACTAL": 3, "HETERO_TERRAIN": 4}
-GRADIENTS = {"LINEAR": 0, "QUADRATIC": 1, "EASING": 2, "DIAGONAL": 3, "RADIAL": 4, "QUADRATIC_SPHERE": 5, "SPHERICAL": 6}
+GRADIENTS = {
+    "LINEAR": 0,
+    "QUADRATIC": 1,
+    "EASING": 2,
+    "DIAGONAL": 3,
+    "RADIAL": 4,
+    "QUADRATIC_SPHERE": 5,
+    "SPHERICAL": 6,
+}
 WAVES = {"BANDS": 0, "RINGS": 1}
 DIRECTIONS = {"X": 0, "Y": 1, "Z": 2, "DIAGONAL": 3, "SPHERICAL": 3}
 PROFILES = {"SIN": 0, "SAW": 1, "TRI": 2}
@@ -40,28 +50,32 @@ def active_uv(b):
 
 def mapping_rows(mapping):
     """What a TexMapping does, as three rows and a translation; None where it does nothing."""
-    from mathutils import Euler, Matrix
-
     if mapping is None:
         return None
-    axes = {"NONE": None, "X": 0, "Y": 1, "Z": 2}
-    picks = [axes[getattr(mapping, f"mapping_{a}")] for a in "xyz"]
-    swizzle = Matrix([[1.0 if pick == column else 0.0 for column in range(3)] for pick in picks])
-    size = [s if mapping.vector_type != "TEXTURE" or abs(s) > 1e-5 else (-1e-5 if s < 0 else 1e-5) for s in mapping.scale]
-    scale, rotation = Matrix.Diagonal(size), Euler(mapping.rotation).to_matrix()
-    move = Matrix.Translation(mapping.translation)
-    if mapping.vector_type == "TEXTURE":
-        matrix = (move @ (rotation @ scale).to_4x4()).inverted_safe()
-    elif mapping.vector_type == "POINT":
-        matrix = move @ (rotation @ scale).to_4x4()
-    elif mapping.vector_type == "VECTOR":
-        matrix = (rotation @ scale).to_4x4()
+    pick = np.array([[getattr(mapping, f"mapping_{row}") == column for column in "XYZ"] for row in "xyz"], float)
+    scale, rotation, move = np.array(mapping.scale), euler_matrix(*mapping.rotation), np.array(mapping.translation)
+    kind = mapping.vector_type
+    if kind in ("TEXTURE", "NORMAL"):  # these divide
+        scale = np.where(np.abs(scale) < 1e-5, np.copysign(1e-5, scale), scale)
+    if kind == "TEXTURE":
+        matrix = np.diag(1.0 / scale) @ rotation.T
+        move = -matrix @ move
     else:
-        matrix = (rotation @ scale.inverted_safe()).to_4x4()
-    matrix = matrix @ swizzle.to_4x4()
-    if matrix == Matrix.Identity(4):
+        matrix = rotation @ np.diag(1.0 / scale if kind == "NORMAL" else scale)
+        move = move if kind == "POINT" else np.zeros(3)
+    matrix = matrix @ pick
+    if np.array_equal(matrix, np.eye(3)) and not move.any():
         return None
-    return [tuple(row)[:3] for row in matrix[:3]] + [tuple(matrix.translation)]
+    return [*(tuple(row) for row in matrix), tuple(move)]
+
+
+def euler_matrix(x: float, y: float, z: float) -> np.ndarray:
+    """Turns about X first, then Y, then Z."""
+    (cx, cy, cz), (sx, sy, sz) = np.cos((x, y, z)), np.sin((x, y, z))
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return about_z @ about_y @ about_x
 
 
 # -------------------------------------------------------------------- procedural
@@ -71,7 +85,9 @@ def mapping_rows(mapping):
 def noise(b):
     n = b.node
     imm = (DIMENSIONS[n.noise_dimensions], FRACTALS[n.noise_type], n.normalize, b.wants("Color"))
-    inputs = [b.input(name) for name in ("W", "Scale", "Detail", "Roughness", "Lacunarity", "Offset", "Gain", "Distortion")]
+    inputs = [
+        b.input(name) for name in ("W", "Scale", "Detail", "Roughness", "Lacunarity", "Offset", "Gain", "Distortion")
+    ]
     value, color = b.op("noise", vector(b, generated), *inputs, imm=imm, kind=COLOR)
     b.output("Fac", value)
     b.output("Color", color)
@@ -79,7 +95,9 @@ def noise(b):
 
 @rule("ShaderNodeTexWhiteNoise")
 def white_noise(b):
-    value, color = b.op("white_noise", b.input("Vector"), b.input("W"), imm=(DIMENSIONS[b.node.noise_dimensions],), kind=COLOR)
+    value, color = b.op(
+        "white_noise", b.input("Vector"), b.input("W"), imm=(DIMENSIONS[b.node.noise_dimensions],), kind=COLOR
+    )
     b.output("Value", value)
     b.output("Color", color)
 
@@ -108,7 +126,9 @@ def gabor(b):
 
 @rule("ShaderNodeTexChecker")
 def checker(b):
-    color, value = b.op("checker", vector(b, generated), b.input("Color1"), b.input("Color2"), b.input("Scale"), kind=COLOR)
+    color, value = b.op(
+        "checker", vector(b, generated), b.input("Color1"), b.input("Color2"), b.input("Scale"), kind=COLOR
+    )
     b.output("Color", color)
     b.output("Fac", value)
 
@@ -135,7 +155,12 @@ def grey(b, value):
 @rule("ShaderNodeTexMagic")
 def magic(b):
     color, value = b.op(
-        "magic", vector(b, generated), b.input("Scale"), b.input("Distortion"), imm=(b.node.turbulence_depth,), kind=COLOR
+        "magic",
+        vector(b, generated),
+        b.input("Scale"),
+        b.input("Distortion"),
+        imm=(b.node.turbulence_depth,),
+        kind=COLOR,
     )
     b.output("Color", color)
     b.output("Fac", value)
@@ -170,7 +195,8 @@ def image(b):
     lookup = (INTERPOLATIONS[n.interpolation], EXTENSIONS[n.extension], b.wants("Alpha"))
     number = load_image(b)
     if n.projection == "BOX":
-        color, alpha = b.op("image_box", vector(b, active_uv), n.projection_blend, imm=(number, *lookup), kind=COLOR)
+        inputs = (vector(b, active_uv), n.projection_blend, b.op("object_normal"))
+        color, alpha = b.op("image_box", *inputs, imm=(number, *lookup), kind=COLOR)
     else:
         color, alpha = b.op("image", vector(b, active_uv), imm=(number, PROJECTIONS[n.projection], *lookup), kind=COLOR)
     b.output("Color", color)

@@ -24,7 +24,9 @@ def sky_texture(b, direction):
         return scattering(b, direction)
     if b.node.sky_type == "HOSEK_WILKIE":
         b.warn("Hosek and Wilkie's sky is not supported; Preetham's is shown instead")
-    return b.op("sky_preetham", direction, imm=(b.table(preetham(tuple(b.node.sun_direction), b.node.turbidity)),), kind=COLOR)
+    return b.op(
+        "sky_preetham", direction, imm=(b.table(preetham(tuple(b.node.sun_direction), b.node.turbidity)),), kind=COLOR
+    )
 
 
 # -------------------------------------------------------------------- scattering

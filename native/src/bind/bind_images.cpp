@@ -33,8 +33,10 @@ ImageTile read_tile(nb::handle tile, const std::string& who) {
   ImageTile t;
   t.height = int(pixels.shape(0)), t.width = int(pixels.shape(1));
   const void* data = pixels.data();
-  if (bytes) t.bytes = static_cast<const uint8_t*>(data);
-  else t.floats = static_cast<const float*>(data);
+  if (bytes)
+    t.bytes = static_cast<const uint8_t*>(data);
+  else
+    t.floats = static_cast<const float*>(data);
   t.srgb = nb::cast<bool>(tile.attr("srgb"));
   t.alpha = read_alpha(nb::cast<std::string>(tile.attr("alpha")), who);
   t.number = nb::cast<int>(tile.attr("tile"));
@@ -89,7 +91,8 @@ nb::tuple sky(bool multiple, float sun_elevation, float sun_size, float altitude
 void bind_images(nb::module_& m) {
   m.def("quantize", quantize, nb::arg("values"), nb::arg("out"), "Writes floats of [0, 1] as bytes, rounded; both arrays are flat.");
   m.def("sky", sky, nb::arg("multiple"), nb::arg("sun_elevation"), nb::arg("sun_size"), nb::arg("altitude"), nb::arg("air"),
-        nb::arg("aerosol"), nb::arg("ozone"), "The table of a sky model, (H, W, 4) float32, and the sun's radiance at its lower and upper edge.");
+        nb::arg("aerosol"), nb::arg("ozone"),
+        "The table of a sky model, (H, W, 4) float32, and the sun's radiance at its lower and upper edge.");
 }
 
 std::unique_ptr<ShaderResources> read_resources(nb::handle scene) {

@@ -1,7 +1,6 @@
 // Texture ops: thin wrappers that read operands and call the textures in textures/. Enum immediates are listed with each op.
-#include "scene/scene.h"
 #include "shading/images.h"
-#include "shading/program.h"
+#include "shading/ops.h"
 #include "shading/resources.h"
 #include "shading/textures/brick.h"
 #include "shading/textures/checker.h"
@@ -125,21 +124,15 @@ void image_texture(const Operands& a, ShadeState& s) {
   set_texel(a, lookup(s, a.imm(3), uv, Interpolation(a.imm(5)), Extension(a.imm(6)), a.imm(7) != 0));
 }
 
-// The shading normal in the object's own space, as Box projection needs it.
-Vec3 object_normal(const ShadeState& s) {
-  if (s.point.instance == kNoId || !s.resources.scene) return s.point.ns;
-  return normalize(s.resources.scene->instances()[s.point.instance].to_world.transposed_vector(s.point.ns));
-}
-
-// image_box(colour, alpha; vector, blend; image, Interpolation, Extension, unassociate)
+// image_box(colour, alpha; vector, blend, normal in object space; image, Interpolation, Extension, unassociate)
 void image_box_texture(const Operands& a, ShadeState& s) {
-  const Vec3 p = a.v(2), n = object_normal(s), weights = box_weights(n, a.f(3));
+  const Vec3 p = a.v(2), n = a.v(4), weights = box_weights(n, a.f(3));
   // No side shows the image mirrored.
   const Vec2 uv[3] = {{n.x < 0.0f ? 1.0f - p.y : p.y, p.z}, {n.y > 0.0f ? 1.0f - p.x : p.x, p.z}, {n.z > 0.0f ? 1.0f - p.y : p.y, p.x}};
   Texel sum{Rgb(), 0};
   for (int i = 0; i < 3; ++i) {
     if (weights[i] <= 0.0f) continue;
-    const Texel t = lookup(s, a.imm(4), uv[i], Interpolation(a.imm(5)), Extension(a.imm(6)), a.imm(7) != 0);
+    const Texel t = lookup(s, a.imm(5), uv[i], Interpolation(a.imm(6)), Extension(a.imm(7)), a.imm(8) != 0);
     sum.color += weights[i] * t.color, sum.alpha += weights[i] * t.alpha;
   }
   set_texel(a, sum);
@@ -186,7 +179,7 @@ constexpr Op kTextureOps[] = {
     {"wave", "f", "vffffff", 3, OpKind::kPure, wave_texture},
     {"magic", "vf", "vff", 1, OpKind::kPure, magic_texture},
     {"image", "vf", "v", 5, OpKind::kContext, image_texture},
-    {"image_box", "vf", "vf", 4, OpKind::kContext, image_box_texture},
+    {"image_box", "vf", "vfv", 4, OpKind::kContext, image_box_texture},
     {"environment", "vf", "v", 3, OpKind::kContext, environment_texture},
     {"sky", "v", "v", 2, OpKind::kContext, sky_texture},
     {"sky_preetham", "v", "v", 1, OpKind::kContext, preetham_texture},

@@ -16,11 +16,21 @@ Quad each(F f) {
   for (int i = 0; i < 4; ++i) q.v[i] = f(i);
   return q;
 }
-Quad operator+(Quad a, Quad b) { return each([&](int i) { return a.v[i] + b.v[i]; }); }
-Quad operator*(Quad a, Quad b) { return each([&](int i) { return a.v[i] * b.v[i]; }); }
-Quad operator*(Quad a, float s) { return each([&](int i) { return a.v[i] * s; }); }
-Quad mix(Quad a, Quad b, float t) { return each([&](int i) { return a.v[i] * (1.0f - t) + b.v[i] * t; }); }
-Quad exp_minus(Quad a) { return each([&](int i) { return std::exp(-a.v[i]); }); }
+Quad operator+(Quad a, Quad b) {
+  return each([&](int i) { return a.v[i] + b.v[i]; });
+}
+Quad operator*(Quad a, Quad b) {
+  return each([&](int i) { return a.v[i] * b.v[i]; });
+}
+Quad operator*(Quad a, float s) {
+  return each([&](int i) { return a.v[i] * s; });
+}
+Quad mix(Quad a, Quad b, float t) {
+  return each([&](int i) { return a.v[i] * (1.0f - t) + b.v[i] * t; });
+}
+Quad exp_minus(Quad a) {
+  return each([&](int i) { return std::exp(-a.v[i]); });
+}
 
 constexpr float kEarthRadius = 6371, kThickness = 100, kAtmosphereRadius = kEarthRadius + kThickness;  // km
 constexpr float kAsymmetry = 0.8f, kGroundAlbedo = 0.3f;
@@ -33,8 +43,10 @@ constexpr float kOzoneDobson = 334.5f;                                          
 constexpr Quad kAerosolAbsorption{{2.8722e-24f, 4.6168e-24f, 7.9706e-24f, 1.3578e-23f}};
 constexpr Quad kAerosolScattering{{1.5908e-22f, 1.7711e-22f, 2.0942e-22f, 2.4033e-22f}};
 constexpr float kAerosolDensity = 1.3681e20f, kAerosolBackground = 2e6f, kAerosolScaleHeight = 0.73f;  // 1/km³, km
-constexpr float kToXyz[4][3] = {{53.386917f, 22.981337f, 0.0f}, {43.904844f, 71.347796f, 0.102507f},  // of a smooth spectrum
-                                {1.613728f, 18.422961f, 31.742921f}, {20.762669f, 2.361421f, 110.480096f}};
+constexpr float kToXyz[4][3] = {{53.386917f, 22.981337f, 0.0f},
+                                {43.904844f, 71.347796f, 0.102507f},  // of a smooth spectrum
+                                {1.613728f, 18.422961f, 31.742921f},
+                                {20.762669f, 2.361421f, 110.480096f}};
 
 Rgb to_rgb(Quad spectrum) {
   float xyz[3] = {};
@@ -60,8 +72,8 @@ struct Medium {
 // A ray from the height `radius` over the earth's centre, `cos_zenith` from straight up. Distance to the sphere; below 0: none.
 float distance_to_sphere(float radius, float cos_zenith, float sphere) {
   const double b = double(radius) * cos_zenith, c = (double(radius) - sphere) * (double(radius) + sphere), d = b * b - c;
-  if ((c > 0.0 && b > 0.0) || d < 0.0) return -1.0f;
-  return float(d > b * b ? -b + std::sqrt(d) : -b - std::sqrt(d));
+  if (c <= 0.0) return float(std::sqrt(d) - b);
+  return b > 0.0 || d < 0.0 ? -1.0f : float(-b - std::sqrt(d));
 }
 // Along that ray at distance t.
 float radius_at(float radius, float cos_zenith, float t) {
@@ -83,7 +95,8 @@ class TransmittanceTable {
   explicit TransmittanceTable(const Atmosphere& a) {
     for (int y = 0; y < kHeights; ++y)
       for (int x = 0; x < kAngles; ++x)
-        at(x, y) = transmittance(2.0f * float(x) / float(kAngles - 1) - 1.0f, kEarthRadius + kThickness * float(y) / float(kHeights - 1), a);
+        at(x, y) =
+            transmittance(2.0f * float(x) / float(kAngles - 1) - 1.0f, kEarthRadius + kThickness * float(y) / float(kHeights - 1), a);
   }
   // `height` in [0, 1] of the atmosphere.
   Quad lookup(float cos_sun, float height) const {

@@ -25,9 +25,7 @@ struct SunDisc {
 };
 
 // In [0, 1] from nadir to zenith.
-inline float sky_row(float elevation) {
-  return 0.5f + 0.5f * std::copysign(std::sqrt(std::abs(elevation) * (2.0f * kInvPi)), elevation);
-}
+inline float sky_row(float elevation) { return 0.5f + 0.5f * std::copysign(std::sqrt(std::abs(elevation) * (2.0f * kInvPi)), elevation); }
 
 // [Nishita et al. 1993, "Display of the earth taking into account atmospheric scattering"], light scattered once.
 // Below the horizon the sky fades out.

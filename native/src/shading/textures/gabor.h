@@ -41,7 +41,8 @@ inline Point<3> gabor_direction(Vec3 base, float isotropy, Point<3> cell, float 
   const float a = hash01(cell[0], cell[1], cell[2], key), b = hash01(cell[2], cell[0], key, cell[1]);
   const float inclination = std::acos(std::clamp(base.z, -1.0f, 1.0f)) + a * kPi * isotropy;
   const float flat = std::sqrt(base.x * base.x + base.y * base.y);
-  const float azimuth = (base.y < 0.0f ? -1.0f : 1.0f) * std::acos(flat > 0.0f ? std::clamp(base.x / flat, -1.0f, 1.0f) : 1.0f) + b * kPi * isotropy;
+  const float azimuth =
+      (base.y < 0.0f ? -1.0f : 1.0f) * std::acos(flat > 0.0f ? std::clamp(base.x / flat, -1.0f, 1.0f) : 1.0f) + b * kPi * isotropy;
   return {{std::sin(inclination) * std::cos(azimuth), std::sin(inclination) * std::sin(azimuth), std::cos(inclination)}};
 }
 

@@ -57,12 +57,8 @@ float hash01(T... x) {
 // Three values from the hash of a point, each in [0, 1]. How keys are permuted is part of the definition.
 inline Rgb hash_rgb(Point<1> p) { return {hash01(p[0]), hash01(p[0], 1.0f), hash01(p[0], 2.0f)}; }
 inline Rgb hash_rgb(Point<2> p) { return {hash01(p[0], p[1]), hash01(p[0], p[1], 1.0f), hash01(p[0], p[1], 2.0f)}; }
-inline Rgb hash_rgb(Point<3> p) {
-  return {hash01(p[0], p[1], p[2]), hash01(p[0], p[1], p[2], 1.0f), hash01(p[0], p[1], p[2], 2.0f)};
-}
-inline Rgb hash_rgb(Point<4> p) {
-  return {hash01(p[0], p[1], p[2], p[3]), hash01(p[2], p[0], p[3], p[1]), hash01(p[3], p[2], p[1], p[0])};
-}
+inline Rgb hash_rgb(Point<3> p) { return {hash01(p[0], p[1], p[2]), hash01(p[0], p[1], p[2], 1.0f), hash01(p[0], p[1], p[2], 2.0f)}; }
+inline Rgb hash_rgb(Point<4> p) { return {hash01(p[0], p[1], p[2], p[3]), hash01(p[2], p[0], p[3], p[1]), hash01(p[3], p[2], p[1], p[0])}; }
 inline float hash_value(Point<1> p) { return hash01(p[0]); }
 inline float hash_value(Point<2> p) { return hash01(p[0], p[1]); }
 inline float hash_value(Point<3> p) { return hash01(p[0], p[1], p[2]); }

@@ -6,8 +6,7 @@ namespace gi::texture {
 
 inline Rgb magic(Vec3 p, float scale, int depth, float distortion) {
   // Reduced first, so that large coordinates neither lose precision nor overflow.
-  const float px = std::fmod(p.x * scale, 2.0f * kPi), py = std::fmod(p.y * scale, 2.0f * kPi),
-              pz = std::fmod(p.z * scale, 2.0f * kPi);
+  const float px = std::fmod(p.x * scale, 2.0f * kPi), py = std::fmod(p.y * scale, 2.0f * kPi), pz = std::fmod(p.z * scale, 2.0f * kPi);
   float x = std::sin((px + py + pz) * 5.0f), y = std::cos((-px + py - pz) * 5.0f), z = -std::cos((-px - py + pz) * 5.0f);
 
   const float d = distortion;

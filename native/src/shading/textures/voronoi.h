@@ -93,7 +93,8 @@ float distance(Point<N> a, Point<N> b, const VoronoiSettings& s) {
   if (N == 1) return d[0];
   float sum = 0, largest = 0;
   switch (s.metric) {
-    case VoronoiMetric::kEuclidean: return std::sqrt(dot(d, d));
+    case VoronoiMetric::kEuclidean:
+      return std::sqrt(dot(d, d));
     case VoronoiMetric::kManhattan:
       for (int i = 0; i < N; ++i) sum += d[i];
       return sum;
@@ -277,9 +278,14 @@ template <int N>
 VoronoiSample<N> voronoi_texture(Point<N> p, const VoronoiSettings& s) {
   VoronoiSample<N> result;
   switch (s.feature) {
-    case VoronoiFeature::kDistanceToEdge: result.distance = detail::fractal_distance_to_edge(p, s); break;
-    case VoronoiFeature::kNSphereRadius: result.distance = detail::sphere_radius(p, s); break;
-    default: result = detail::fractal(p, s);
+    case VoronoiFeature::kDistanceToEdge:
+      result.distance = detail::fractal_distance_to_edge(p, s);
+      break;
+    case VoronoiFeature::kNSphereRadius:
+      result.distance = detail::sphere_radius(p, s);
+      break;
+    default:
+      result = detail::fractal(p, s);
   }
   return result;
 }
