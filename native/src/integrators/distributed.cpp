@@ -22,7 +22,6 @@ class DistributedIntegrator final : public Integrator {
   PixelSample trace(const RenderContext& context, const FilmSpec& film, const CameraRay& camera, Sampler& sampler) const {
     static thread_local Bsdf bsdf;
     PixelSample result;
-    result.alpha = 0;
     Ray ray = camera.ray;
     PathState path;
     RayOrigin origin;
@@ -35,16 +34,22 @@ class DistributedIntegrator final : public Integrator {
       const auto hit = context.scene.intersect(ray, visibility);
       result.radiance += throughput * lamps_along(context, ray, hit ? hit->t : kInf, origin, LightSampling::kMis, visibility);
       if (!hit) {
-        if (seen_from_camera && film.transparent) break;
+        if (seen_from_camera && film.transparent) {
+          result.alpha -= average(throughput);
+          break;
+        }
         const Rgb beyond = throughput * light_beyond(context, ray, origin, LightSampling::kMis, path);
-        if (seen_from_camera) result.environment += beyond, result.alpha += average(throughput);
+        if (seen_from_camera) result.environment += beyond;
         result.radiance += beyond;
         break;
       }
       ShadingPoint point = context.scene.shading_point(ray, *hit, path, camera.footprint + camera.spread * hit->t);
       context.scene.shade(point, bsdf);
       if (path.depth == 0) record_surface(context, point, bsdf, result);
-      if (seen_from_camera) result.alpha += std::max(0.0f, average(throughput * (Rgb(1.0f) - bsdf.transparency - bsdf.holdout)));
+      if (seen_from_camera) {
+        if (context.scene.instances()[point.instance].data->holdout) bsdf.hold_out();
+        result.alpha -= average(throughput * bsdf.holdout);
+      }
 
       // Direct light: the surface's own, and one light's, weighed against the ray that follows.
       const Rgb emitted = throughput * surface_emission(context, point, bsdf, origin, LightSampling::kMis, hit->t);

@@ -75,14 +75,13 @@ class PathIntegrator final : public Integrator {
   PixelSample trace(const RenderContext& context, const FilmSpec& film, const CameraRay& camera, Sampler& sampler) const {
     static thread_local Bsdf bsdf;
     PixelSample result;
-    result.alpha = 0;
     Ray ray = camera.ray;
     PathState path;
     RayOrigin origin;
     Rgb throughput(1.0f);
     float travelled = 0;            // along the path, for the footprint
     bool may_scatter = true;        // false past the bounce limit: the next surface only emits
-    bool seen_from_camera = true;   // nothing but transparent surfaces so far: alpha is decided here
+    bool seen_from_camera = true;   // nothing but transparent surfaces so far: what is not covered makes holes in alpha
     origin.query.path = path;
 
     const auto add = [&](Rgb radiance, int depth) {
@@ -100,9 +99,12 @@ class PathIntegrator final : public Integrator {
       // Leave the scene: suns and the world.
       if (!hit) {
         const Rgb beyond = light_beyond(context, ray, origin, s_.light_sampling, path);
-        if (seen_from_camera && film.transparent) break;
-        if (seen_from_camera) result.alpha += average(throughput), result.environment += throughput * beyond;
-        add(beyond, path.depth);
+        if (seen_from_camera && film.transparent) {
+          result.alpha -= average(throughput);
+        } else {
+          if (seen_from_camera) result.environment += throughput * beyond;
+          add(beyond, path.depth);
+        }
         break;
       }
 
@@ -112,17 +114,8 @@ class PathIntegrator final : public Integrator {
 
       // Cut out what is held out.
       if (seen_from_camera) {
-        const bool whole = context.scene.instances()[point.instance].data->holdout;
-        const Rgb cut = whole ? Rgb(1.0f) - bsdf.transparency : bsdf.holdout;
-        const float covered = average(throughput * (Rgb(1.0f) - bsdf.transparency - cut));
-        result.alpha += std::max(covered, 0.0f);
-        if (whole) {
-          throughput *= bsdf.transparency;
-          if (is_black(throughput)) break;
-          path.transparent_depth++;
-          ray = {offset_point(point.position, point.ng, ray.direction), ray.direction, 0.0f, kInf};
-          continue;
-        }
+        if (context.scene.instances()[point.instance].data->holdout) bsdf.hold_out();
+        result.alpha -= average(throughput * bsdf.holdout);
       }
 
       // Add what the surface emits, then what lights send to it.
@@ -174,7 +167,6 @@ class PathIntegrator final : public Integrator {
         throughput *= 1.0f / alpha;
       }
     }
-    result.alpha = film.transparent ? std::clamp(result.alpha, 0.0f, 1.0f) : result.alpha;
     return result;
   }
 

@@ -68,6 +68,13 @@ void Bsdf::finish(Vec3 wo) {
   for (int i = 0; i < count_; ++i) entries_[i].select *= scale;
 }
 
+void Bsdf::hold_out() {
+  count_ = 0;
+  emission = Rgb(), holdout = Rgb(1.0f) - transparency;
+  flags_ &= kTransparent;
+  select_transparent_ = flags_ ? 1.0f : 0.0f;
+}
+
 // What a bumped normal takes away. Interpolated normals let light in from beyond the geometric horizon, or terminators would show
 // facets; a bumped normal may not let it in from beyond the interpolated horizon, or surfaces would leak.
 float Bsdf::shadowing(const Entry& e, Vec3 wi, float cos_i, bool sampled) const {

@@ -40,6 +40,9 @@ class Bsdf {
   // Called once after the last add: selection probabilities from the lobes' albedos towards `wo`.
   void finish(Vec3 wo);
 
+  // Turns the whole surface, but for what it lets through, into a hole of the picture. After finish().
+  void hold_out();
+
   LobeEval eval(Vec3 wo, Vec3 wi) const;  // delta lobes contribute nothing
   // As eval, but the value is only of lobes whose side and kind for this pair (say kReflection and kDiffuse) are both in
   // `flags`; the density stays that of the whole mix. For passes and Light Path logic.
