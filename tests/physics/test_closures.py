@@ -140,6 +140,8 @@ WHITE = {
     "thin glass": {"transmission": 1.0, "thin_wall": 1.0, "roughness": 0.4},
     "leaf": {"subsurface": 1.0, "thin_wall": 1.0, "subsurface_anisotropy": 0.3, "diffuse_roughness": 0.6},
     "diamond": {"ior": 2.4, "roughness": 1.0},
+    "soap": {"transmission": 1.0, "roughness": 0.1, "film": 420.0},
+    "soap bubble": {"transmission": 1.0, "roughness": 0.0, "thin_wall": 1.0, "film": 420.0},
     "everything": {
         "coat": 0.6,
         "sheen": 0.7,

@@ -27,9 +27,6 @@ inline Vec3 rotated(Vec3 v, Vec3 axis, float angle) {
   return v * c + cross(axis, v) * sn + axis * (dot(axis, v) * (1.0f - c));
 }
 
-inline constexpr float kFilmCutoff = 0.1f;  // nanometres under which there is no film
-inline Fresnel with_film(const Fresnel& bare, float thickness, float ior) { return bare.with_film(thickness, ior); }
-
 struct Anisotropy {
   float alpha_x, alpha_y;
   Vec3 tangent;

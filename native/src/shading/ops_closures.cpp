@@ -98,7 +98,7 @@ void glass(const Operands& o, ShadeState& s) {
   const float alpha = sqr(clamp01(o.f(2))), ior = std::max(o.f(3), 1e-5f), film_ior = std::max(o.f(6), 1e-5f);
   const bool inside = s.point.backfacing;
   const Fresnel bare = Fresnel::schlick(inside ? 1.0f / ior : ior, Rgb(f0_from_ior(ior)), Rgb(1.0f), color, color);
-  const Fresnel f = with_film(bare, o.f(5), inside ? film_ior / ior : film_ior);
+  const Fresnel f = bare.with_film(o.f(5), inside ? film_ior / ior : film_ior);
   add_facets(s, Rgb(o.f(0)), o.imm(7), visible_normal(s, normal_or_shading(s, o.v(4))), {}, [&]<class L>() { return L::glass(alpha, f); });
 }
 
@@ -107,7 +107,7 @@ void metallic(const Operands& o, ShadeState& s) {
   const bool physical = o.imm(11) != 0;
   const Fresnel bare =
       physical ? Fresnel::conductor(positive(o.c(1)), positive(o.c(2))) : Fresnel::f82_tint(clamped(o.c(1)), clamped(o.c(2)));
-  const Fresnel f = with_film(bare, o.f(8), std::max(o.f(9), 1e-5f));
+  const Fresnel f = bare.with_film(o.f(8), std::max(o.f(9), 1e-5f));
   const Vec3 n = normal_or_shading(s, o.v(6)), tangent = o.v(7);
   const Anisotropy a = anisotropy(clamp01(o.f(3)), clamp01(o.f(4)), o.f(5), n, tangent);
   add_facets(s, Rgb(o.f(0)), o.imm(10), visible_normal(s, n), a.tangent, [&]<class L>() { return L::reflection(a.alpha_x, a.alpha_y, f); });

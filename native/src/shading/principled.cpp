@@ -44,7 +44,7 @@ Rgb add_coat(ShadeState& s, const PrincipledTop& p, Vec3 coat_normal, Rgb weight
 
 void add_metal(ShadeState& s, const Principled& p, Vec3 n, Rgb weight) {
   const Anisotropy a = anisotropy(p.roughness, p.anisotropic, p.anisotropic_rotation, p.normal, p.tangent);
-  const Fresnel f = with_film(Fresnel::f82_tint(clamped(p.base_color), clamped(p.specular_tint)), p.film_thickness, p.film_ior);
+  const Fresnel f = Fresnel::f82_tint(clamped(p.base_color), clamped(p.specular_tint)).with_film(p.film_thickness, p.film_ior);
   add_ggx(s, weight, GgxLobe::reflection(a.alpha_x, a.alpha_y, f), n, a.tangent, p.preserve_energy);
 }
 
@@ -54,7 +54,7 @@ void add_glass(ShadeState& s, const Principled& p, Vec3 n, Rgb weight) {
   // The light passes the surface twice on its way through: each time half of the colour.
   const Rgb tint{std::sqrt(c.r), std::sqrt(c.g), std::sqrt(c.b)};
   const float film_ior = s.point.backfacing ? p.film_ior / p.ior : p.film_ior;
-  const Fresnel f = with_film(Fresnel::schlick(eta, f0, Rgb(1.0f), Rgb(1.0f), tint), p.film_thickness, film_ior);
+  const Fresnel f = Fresnel::schlick(eta, f0, Rgb(1.0f), Rgb(1.0f), tint).with_film(p.film_thickness, film_ior);
   add_ggx(s, weight, GgxLobe::glass(sqr(p.roughness), f), n, {}, p.preserve_energy);
 }
 
@@ -66,11 +66,11 @@ struct ThinSheet {
 ThinSheet thin_sheet(const Principled& p, float cos_o) {
   const Rgb f0 = p.specular_tint * f0_from_ior(p.ior), c = clamped(p.base_color);
   const auto side = [&](float ior, float film_ior, float cos_side) {
-    return with_film(Fresnel::schlick(ior, f0, Rgb(1.0f), Rgb(1.0f), Rgb(1.0f)), p.film_thickness, film_ior)(cos_side);
+    return Fresnel::schlick(ior, f0, Rgb(1.0f), Rgb(1.0f), Rgb(1.0f)).with_film(p.film_thickness, film_ior)(cos_side);
   };
   const float cos_t2 = 1.0f - (1.0f - sqr(cos_o)) / sqr(p.ior), cos_t = safe_sqrt(cos_t2);
   const FresnelTerms top = side(p.ior, p.film_ior, cos_o);
-  const FresnelTerms bottom = p.film_thickness > kFilmCutoff ? side(1.0f / p.ior, p.film_ior / p.ior, cos_t) : top;
+  const FresnelTerms bottom = ThinFilm{p.film_thickness, p.film_ior} ? side(1.0f / p.ior, p.film_ior / p.ior, cos_t) : top;
   ThinSheet sheet;
   for (int i = 0; i < 3; ++i) {
     const float through = cos_t > 0.0f ? std::pow(c[i], 1.0f / cos_t) : 0.0f;
@@ -103,10 +103,10 @@ Rgb add_specular(ShadeState& s, const Principled& p, Vec3 n, Rgb weight) {
     f0 *= 2.0f * p.specular_level;
     eta = p.ior < 1.0f ? 1.0f / ior_from_f0(f0) : ior_from_f0(f0);
   }
-  if (!reflects(s) || (eta == 1.0f && p.film_thickness <= kFilmCutoff)) return weight;
+  if (!reflects(s) || (eta == 1.0f && !ThinFilm{p.film_thickness, p.film_ior})) return weight;
   const Anisotropy a = anisotropy(p.roughness, p.anisotropic, p.anisotropic_rotation, p.normal, p.tangent);
   const Fresnel bare = Fresnel::schlick(eta, p.specular_tint * f0, Rgb(1.0f), Rgb(1.0f), Rgb());
-  const Fresnel f = with_film(bare, p.film_thickness, p.film_ior);
+  const Fresnel f = bare.with_film(p.film_thickness, p.film_ior);
   return under_layer(weight, add_ggx(s, weight, GgxLobe::reflection(a.alpha_x, a.alpha_y, f), n, a.tangent, p.preserve_energy));
 }
 
