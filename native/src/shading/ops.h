@@ -1,4 +1,4 @@
-// The families of ops. A family is one ops_*.cpp file with a table at its end.
+// The families of ops. A family is one ops_*.cpp file with a table at its end; those that ask the scene live in scene/.
 #pragma once
 #include <span>
 

@@ -1,6 +1,6 @@
 // Ops that make normals and tangents: normal maps, bumps from heights at shifted points, displacement as bump.
+#include "scene/object_space.h"
 #include "scene/scene.h"
-#include "shading/object_space.h"
 #include "shading/op_helpers.h"
 #include "shading/ops.h"
 

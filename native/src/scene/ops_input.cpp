@@ -1,9 +1,9 @@
 // Ops that read the shading point, its object, its path and the camera: Geometry, Texture Coordinate, Object Info, Light Path,
 // attributes, transforms between spaces. Leaves out normals (ops_normal).
 #include "scene/camera.h"
+#include "scene/object_space.h"
 #include "scene/scene.h"
 #include "shading/lobes/fresnel.h"
-#include "shading/object_space.h"
 #include "shading/op_helpers.h"
 #include "shading/ops.h"
 

@@ -1,0 +1,48 @@
+"""How shader nodes name what they want to know of objects, in scene_data.Scene.attribute_names. No bpy.
+
+A plain name is an attribute of the mesh and "" its active UV map; the names below cannot be names of attributes.
+"""
+
+from __future__ import annotations
+
+UNDEFORMED = ".undeformed"  # positions before deformation, for Generated coordinates
+ACTIVE_COLOR = ".active_color"  # the colour attribute that renders
+PREFIXES = {"OBJECT": "\x01object:", "INSTANCER": "\x01instancer:"}  # properties, by their data path
+
+
+def attribute_name(kind: str, name: str) -> str:
+    """The name of an attribute of the Attribute node's type `kind` (GEOMETRY, OBJECT or INSTANCER)."""
+    return PREFIXES.get(kind, "") + name
+
+
+def property_paths(names, kind: str) -> dict[str, str]:
+    """Those of `names` that are properties of `kind`: name -> data path."""
+    prefix = PREFIXES[kind]
+    return {name: name[len(prefix) :] for name in names if name.startswith(prefix)}
+
+
+def four_numbers(value) -> tuple | None:
+    """A property's value as a colour or vector; None where it is neither that nor a number."""
+    if isinstance(value, (bool, int, float)):
+        return (float(value),) * 3 + (1.0,)
+    try:
+        numbers = [float(x) for x in value]
+    except (TypeError, ValueError):
+        return None
+    if not numbers or len(numbers) > 4:
+        return None
+    return tuple(numbers + [0.0] * (3 - len(numbers)) + [1.0] * (4 - max(len(numbers), 3)))
+
+
+def look_up(owners, path: str) -> tuple | None:
+    """The property at `path` of the first of `owners` that has it: a custom property's name or a path such as "color"."""
+    for owner in owners:
+        if owner is None:
+            continue
+        if path in owner.keys():
+            return four_numbers(owner[path])
+        try:
+            return four_numbers(owner.path_resolve(path))
+        except (ValueError, TypeError):
+            continue
+    return None
