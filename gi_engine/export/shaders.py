@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..nodes.attributes import look_up, property_paths
 from ..scene_data import Scene
 from .warnings import Warnings
 
@@ -43,7 +44,15 @@ class Shaders:
         return set(self.scene.attribute_names)
 
     def object_attributes(self, prototype) -> dict[str, tuple]:
-        return {}
+        """Properties of an object, its data and what instances it that programs ask for."""
+        item, parent = prototype.object, prototype.parent
+        values = {}
+        for kind, owners in {"OBJECT": (item, item.data), "INSTANCER": (parent, item, item.data)}.items():
+            for name, path in property_paths(self.scene.attribute_names, kind).items():
+                value = look_up(owners, path)
+                if value is not None:
+                    values[name] = value
+        return values
 
 
 def has_nodes(owner) -> bool:

@@ -6,18 +6,22 @@ Anything that cannot be rendered gets a stated fallback and one warning that nam
 from __future__ import annotations
 
 import importlib
+import sys
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 from ..scene_data import Program, Scene
+from .attributes import look_up
 from .program import COLOR, FLOAT, VECTOR, ProgramBuilder, Value
 from .rules import CLOSURE_RULES, RULES
 
-for _family in ("closures", "textures"):
+for _family in ("values", "math", "color", "vector", "input", "textures", "closures"):
     importlib.import_module(f"{__package__}.rules_{_family}")
 
 KIND_OF_SOCKET = {"VALUE": FLOAT, "INT": FLOAT, "BOOLEAN": FLOAT, "VECTOR": VECTOR, "ROTATION": VECTOR, "RGBA": COLOR}
 DEFAULT_GREY = 0.8  # of objects without a material
+DISPLACEMENT_FILTER_WIDTH = 0.1  # pixels, as of a new Bump node
+DEEPEST = 20000  # Python's recursion limit while a tree is compiled: some frames for each node of a chain
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,7 @@ class Source:
     context: Context
     node: object
     socket: object
+    through: tuple = ()  # kinds of the sockets of groups and muted nodes that the value passes on its way, last one first
 
 
 class Compiler:
@@ -72,102 +77,121 @@ class Compiler:
             self.scene.images.append(load())
         return self._images[key]
 
+    def matrix_of(self, owner):
+        """The object to world matrix of an object that a node refers to."""
+        return owner.evaluated_get(self.depsgraph).matrix_world
+
+    def view_layer_attribute(self, name: str) -> tuple:
+        """A property of the view layer or the scene as four numbers; zeros where there is none."""
+        owners = (self.depsgraph.view_layer_eval, self.depsgraph.scene_eval)
+        return look_up(owners, name) or (0.0, 0.0, 0.0, 1.0)
+
     # ---------------------------------------------------------------- entry points
 
     def material(self, material) -> Program:
         if material is None:
             return self._plain("default material", (DEFAULT_GREY,) * 3)
-        tree = material.node_tree if material.use_nodes else None
-        if tree is None:
+        if not has_nodes(material):
             return self._plain(material.name, tuple(material.diffuse_color[:3]))
-        walker = TreeWalker(self, f"material '{material.name}'")
-        output = tree.get_output_node("CYCLES")
-        if output is None:
-            self.warn(f"material '{material.name}' has no active Material Output node: it renders black")
-        else:
-            walker.surface(Context(tree), output, displaced=material.displacement_method != "DISPLACEMENT")
-        program = walker.finish(material.name)
+        walker = TreeWalker(self, f"material '{material.name}'", material)
+        with deep_recursion():
+            walker.surface(material)
+        program = walker.builder.finish(material.name)
         program.pass_index = material.pass_index
         settings = getattr(material, "cycles", None)
-        if settings is not None:
-            program.emission_sampling = getattr(settings, "emission_sampling", "AUTO")
+        program.emission_sampling = getattr(settings, "emission_sampling", "AUTO")
         program.transparent_shadows = getattr(material, "use_transparent_shadow", True)
         return program
 
     def light(self, light) -> Program:
         """The emission of a lamp's node tree, to be multiplied with the lamp's own."""
-        return self._emitter(light.node_tree, f"light '{light.name}'", light.name)
+        return self._emitter(light, "light")
 
     def world(self, world) -> Program:
-        if world.node_tree is None or not world.use_nodes:
-            walker = TreeWalker(self, f"world '{world.name}'")
-            walker.builder.op("emission", 1.0, tuple(world.color), 1.0)
-            return walker.finish(world.name)
-        return self._emitter(world.node_tree, f"world '{world.name}'", world.name)
+        if has_nodes(world):
+            return self._emitter(world, "world")
+        walker = TreeWalker(self, f"world '{world.name}'", world)
+        walker.builder.op("emission", 1.0, tuple(world.color), 1.0)
+        return walker.builder.finish(world.name)
 
-    def _emitter(self, tree, who: str, name: str) -> Program:
-        walker = TreeWalker(self, who)
-        output = tree.get_output_node("CYCLES")
+    def _emitter(self, owner, what: str) -> Program:
+        walker = TreeWalker(self, f"{what} '{owner.name}'", owner)
+        output = owner.node_tree.get_output_node("CYCLES")
         if output is not None:
-            walker.closure_input(Context(tree), output.inputs["Surface"], walker.builder.constant(1.0))
-        return walker.finish(name)
+            walker.warn_of_volume(Context(owner.node_tree), output)
+            with deep_recursion():
+                walker.closure_input(Context(owner.node_tree), output.inputs["Surface"], walker.builder.constant(1.0))
+        return walker.builder.finish(owner.name)
 
     def _plain(self, name: str, color: tuple) -> Program:
-        walker = TreeWalker(self, name)
-        walker.builder.op("diffuse", 1.0, color, 0.0, (0.0, 0.0, 0.0))
-        return walker.finish(name)
+        builder = ProgramBuilder()
+        builder.op("diffuse", 1.0, color, 0.0, (0.0, 0.0, 0.0))
+        return builder.finish(name)
 
 
 class TreeWalker:
     """One program: follows links from the output node and lets rules emit instructions."""
 
-    def __init__(self, compiler: Compiler, who: str):
+    def __init__(self, compiler: Compiler, who: str, owner):
         self.compiler = compiler
         self.who = who
+        self.owner = owner
         self.builder = ProgramBuilder()
         self.outputs: list[dict] = [{}]  # outputs of nodes by (context, node), innermost scope last
         self.active: list[tuple] = []  # nodes being compiled, to find cycles
 
-    def finish(self, name: str) -> Program:
-        return self.builder.finish(name)
-
-    def surface(self, context: Context, output, displaced: bool) -> None:
-        if displaced and self.resolve(context, output.inputs["Displacement"]).node is not None:
+    def surface(self, material) -> None:
+        context = Context(material.node_tree)
+        output = material.node_tree.get_output_node("CYCLES")
+        if output is None:
+            self.compiler.warn(f"{self.who} has no Material Output node: it renders black")
+            return
+        if self.resolve(context, output.inputs["Displacement"]).node is not None:
+            if material.displacement_method != "BUMP":
+                self.compiler.warn(f"{self.who}: node '{output.name}' moves the surface; its displacement is rendered as bump alone")
             NodeBuilder(self, context, output).bump_displacement()
-        if self.resolve(context, output.inputs["Volume"]).node is not None:
-            self.compiler.warn(f"{self.who}: volumes are not rendered yet; node '{output.name}' renders without its volume")
+        self.warn_of_volume(context, output)
         self.closure_input(context, output.inputs["Surface"], self.builder.constant(1.0))
+
+    def warn_of_volume(self, context: Context, output) -> None:
+        socket = output.inputs.get("Volume")
+        if socket is not None and self.resolve(context, socket).node is not None:
+            self.compiler.warn(f"{self.who}: volumes are not rendered yet; node '{output.name}' renders without its volume")
 
     # ---------------------------------------------------------------- following links
 
     def resolve(self, context: Context, socket) -> Source:
         """Goes back through reroutes, muted nodes and group borders to what feeds an input socket."""
+        through: list[str] = []
         while True:
             link = self.live_link(context, socket)
             if link is None:
-                return Source(context, None, socket)
+                return Source(context, None, socket, tuple(through))
             node, output = link.from_node, link.from_socket
             if node.type == "REROUTE":
                 socket = node.inputs[0]
             elif node.mute:
-                through = next((i for i in node.internal_links if i.to_socket == output), None)
-                if through is None:
-                    return Source(context, None, socket)
-                socket = through.from_socket
-            elif node.type == "GROUP":
+                inner = next((i for i in node.internal_links if i.to_socket == output), None)
+                if inner is None:
+                    return Source(context, None, socket, tuple(through))
+                through += [kind_of(output), kind_of(inner.from_socket)]
+                socket = inner.from_socket
+            elif node.type in {"GROUP", "CUSTOM GROUP"}:
                 inside = group_output(node)
                 if inside is None:
                     self.compiler.warn(f"{self.who}: node group '{node.name}' has no output; it gives its default")
-                    return Source(context, None, socket)
+                    return Source(context, None, socket, tuple(through))
+                through.append(kind_of(output))
                 context = Context(node.node_tree, node, context)
                 socket = by_identifier(inside.inputs, output.identifier)
             elif node.type == "GROUP_INPUT":
                 if context.parent is None:
-                    return Source(context, None, socket)
+                    return Source(context, None, socket, tuple(through))
+                through.append(kind_of(output))
                 socket = by_identifier(context.group.inputs, output.identifier)
                 context = context.parent
             else:
-                return Source(context, node, output)
+                return Source(context, node, output, tuple(through))
 
     def live_link(self, context: Context, socket):
         if socket is None or not socket.is_linked:
@@ -185,19 +209,24 @@ class TreeWalker:
 
     def value(self, context: Context, socket, kind: str | None = None) -> Value:
         """The value that arrives at an input socket, converted to `kind`, by default the socket's own."""
-        kind = kind or KIND_OF_SOCKET.get(socket.type, FLOAT)
         source = self.resolve(context, socket)
         if source.node is None:
             value = self.default(source.socket)
         else:
-            value = self.node_outputs(source.context, source.node).get(source.socket.identifier)
-            if value is None:  # an output that the rule does not make: said by the rule's owner
-                value = self.builder.constant(0.0)
-        # What arrives is first what the sending socket is, then what the receiving one is.
-        return self.builder.as_kind(value, kind)
+            value = self.output_of(source)
+        for passed in (*reversed(source.through), kind or kind_of(socket)):
+            value = self.builder.as_kind(value, passed)
+        return value
+
+    def output_of(self, source: Source) -> Value:
+        """What the output socket of a source gives, as the kind of that socket."""
+        value = self.node_outputs(source.context, source.node).get(source.socket.identifier)
+        if value is None:  # an output that the rule does not make
+            value = self.builder.constant(0.0)
+        return self.builder.as_kind(value, kind_of(source.socket))
 
     def default(self, socket) -> Value:
-        kind = KIND_OF_SOCKET.get(socket.type)
+        kind = KIND_OF_SOCKET.get(socket.type) if socket else None
         if kind is None or not hasattr(socket, "default_value"):
             return self.builder.constant(0.0)
         if kind == FLOAT:
@@ -231,7 +260,7 @@ class TreeWalker:
         if node is None:
             return
         if source.socket.type != "SHADER":  # a colour plugged into a shader socket emits, as in Cycles
-            color = self.builder.as_kind(self.node_outputs(source.context, node).get(source.socket.identifier, self.builder.constant(0.0)), COLOR)
+            color = self.builder.as_kind(self.output_of(source), COLOR)
             self.builder.op("emission", weight, color, 1.0)
             return
         rule = CLOSURE_RULES.get(node.bl_idname)
@@ -254,14 +283,20 @@ class TreeWalker:
         self.outputs.pop()
 
     @contextmanager
-    def shifted(self, axis: int):
-        """Everything inside is computed again at the point moved by one step of the pixel's footprint along `axis`."""
+    def isolated(self):
+        """Nothing computed outside is used inside, nor the other way round: for what depends on a point or normal that changes."""
         outer, self.outputs = self.outputs, [{}]
         with self.builder.isolated():
-            self.builder.op("bump_shift", imm=(axis,))
             yield
-            self.builder.op("bump_shift", imm=(-1,))
         self.outputs = outer
+
+    @contextmanager
+    def shifted(self, axis: int, width: Value):
+        """Inside, the point is moved over the surface by `width` pixels along `axis`."""
+        with self.isolated():
+            before = self.builder.op("bump_shift", width, imm=(axis,))
+            yield
+            self.builder.op("bump_restore", *before)
 
 
 class NodeBuilder:
@@ -320,8 +355,22 @@ class NodeBuilder:
     def branch(self, condition: Value):
         return self.walker.branch(condition)
 
-    def shifted(self, axis: int):
-        return self.walker.shifted(axis)
+    def shifted_values(self, make, width: Value) -> list[Value]:
+        """make() at the point, and with the point moved by `width` pixels along each axis."""
+        values = [make()]
+        for axis in (0, 1):
+            with self.walker.shifted(axis, width):
+                values.append(make())
+        return values
+
+    @property
+    def owner(self):
+        """The material, light or world."""
+        return self.walker.owner
+
+    def matrix_of(self, owner):
+        """The object to world matrix of another object that the node refers to."""
+        return self.compiler.matrix_of(owner)
 
     def image(self, key, load) -> int:
         return self.compiler.image(key, load)
@@ -337,11 +386,29 @@ class NodeBuilder:
 
     def bump_displacement(self) -> None:
         """Displacement as a change of the shading normal alone, before the surface is compiled."""
-        heights = [self.op("dot_normal", self.input("Displacement"))]
-        for axis in (0, 1):
-            with self.shifted(axis):
-                heights.append(self.op("dot_normal", self.input("Displacement")))
-        self.op("set_normal", self.op("bump", *heights, 1.0, 1.0, (0.0, 0.0, 0.0), imm=(0,)))
+        with self.walker.isolated():
+            width = self.constant(DISPLACEMENT_FILTER_WIDTH)
+            heights = self.shifted_values(lambda: self.op("vector_dot_product", self.input("Displacement"), self.op("normal")), width)
+            self.op("set_normal", self.op("bump", *heights, 1.0, 1.0, width, self.op("normal"), imm=(True,)))
+
+
+def has_nodes(owner) -> bool:
+    """From Blender 5.0 on all materials and worlds have their nodes in use."""
+    return owner.node_tree is not None and (hasattr(owner, "inline_shader_nodes") or owner.use_nodes)
+
+
+@contextmanager
+def deep_recursion():
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(limit, DEEPEST))
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(limit)
+
+
+def kind_of(socket) -> str:
+    return KIND_OF_SOCKET.get(socket.type, FLOAT)
 
 
 def by_identifier(sockets, identifier: str):

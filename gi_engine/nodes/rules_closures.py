@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from .program import COLOR, Value
 from .rules import closure_rule
+from .rules_input import radial_tangent
 
 NONE = (0.0, 0.0, 0.0)  # a normal or tangent that is not linked
 CUTOFF = 1e-5  # weights below this do not show, as in Cycles
@@ -32,13 +33,11 @@ def normal(b, name: str = "Normal"):
 
 
 def tangent(b, anisotropy: Value):
-    """The Tangent socket; only looked up where the surface is anisotropic."""
+    """The Tangent socket; only looked up where the surface is anisotropic. Not linked: around the object's z axis."""
     n = number(b, anisotropy)
     if n is not None and abs(n) <= 1e-4:
         return NONE
-    if not b.linked("Tangent"):
-        b.warn("anisotropy needs a Tangent that is linked; it is isotropic")
-    return b.linked_or("Tangent", NONE)
+    return b.input("Tangent") if b.linked("Tangent") else radial_tangent(b)
 
 
 def film(b):
