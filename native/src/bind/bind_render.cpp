@@ -29,6 +29,30 @@ BoundScene* make_scene(nb::handle data, const std::string& embree, int threads) 
   return bound.release();
 }
 
+// What a pinhole in the middle of each pixel sees of emission alone.
+nb::ndarray<nb::numpy, float> emission_seen(const BoundScene& bound, nb::handle data, size_t width, size_t height) {
+  const Scene& scene = *bound.scene;
+  const Camera camera = read_camera(data);
+  auto* pixels = new std::vector<float>(width * height * 3);
+  nb::capsule owner(pixels, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+  scene.resources().camera = &camera;
+  const Vec2 pixel{1.0f / float(width), 1.0f / float(height)};
+  for (size_t i = 0; i < width * height; ++i) {
+    const Vec2 film{(float(i % width) + 0.5f) * pixel.x, (float(i / width) + 0.5f) * pixel.y};
+    const CameraRay r = camera.sample(film, pixel, {0.5f, 0.5f});
+    Rgb seen;
+    if (const auto hit = scene.intersect(r.ray, kRayCamera)) {
+      ShadingPoint point = scene.shading_point(r.ray, *hit, {}, r.footprint + r.spread * hit->t);
+      seen = scene.emission(point);
+    } else {
+      seen = scene.world_radiance(r.ray.direction, {});
+    }
+    std::copy_n(&seen.r, 3, pixels->data() + 3 * i);
+  }
+  scene.resources().camera = nullptr;
+  return nb::ndarray<nb::numpy, float>(pixels->data(), {height, width, 3}, owner);
+}
+
 nb::dict progress_dict(const Session& session) {
   Progress p;
   {
@@ -105,6 +129,8 @@ void bind_render(nb::module_& m) {
       .def_prop_ro("warnings", [](const BoundScene& s) { return s.warnings; })
       .def_prop_ro("embree", [](const BoundScene& s) { return s.scene->embree_description(); }, "The library in use and its version.")
       .def_prop_ro("memory", [](const BoundScene& s) { return s.scene->memory_bytes(); }, "Bytes.")
+      .def("emission_seen", &emission_seen, nb::arg("camera"), nb::arg("width"), nb::arg("height"),
+           "What is emitted towards the camera at the middle of each pixel: (height, width, 3) float32, row 0 at the bottom.")
       .def("trace", [](const BoundScene& s, nb::ndarray<const float, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu> rays) {
              const size_t n = rays.shape(0);
              auto* t = new std::vector<float>(n);
