@@ -9,6 +9,7 @@ from __future__ import annotations
 from .program import COLOR, Value
 from .rules import closure_rule
 from .rules_input import radial_tangent
+from .rules_input import radial_tangent
 
 NONE = (0.0, 0.0, 0.0)  # a normal or tangent that is not linked
 CUTOFF = 1e-5  # weights below this do not show, as in Cycles
@@ -33,7 +34,7 @@ def normal(b, name: str = "Normal"):
 
 
 def tangent(b, anisotropy: Value):
-    """The Tangent socket; only looked up where the surface is anisotropic. Not linked: around the object's z axis."""
+    """The Tangent socket; only looked up where the surface is anisotropic."""
     n = number(b, anisotropy)
     if n is not None and abs(n) <= 1e-4:
         return NONE
