@@ -100,8 +100,8 @@ def named(message: str, scene: bpy.types.Scene) -> str:
 
 
 def escaped(path: str) -> str:
-    """From 5.0 on, braces in paths are Blender's templates."""
-    return path.replace("{", "{{").replace("}", "}}") if bpy.app.version >= (5, 0, 0) else path
+    """Braces in paths are Blender's templates."""
+    return path.replace("{", "{{").replace("}", "}}")
 
 
 # `blender -c gi_engine …`
