@@ -1,0 +1,112 @@
+"""One tile per closure and variant: smooth balls from above under a square lamp and a constant sky."""
+
+from .studio import LAMP, SKY, ball, lamp, material, node, output, sheet, tree_of, world
+
+GLOSSY, GLASS, PRINCIPLED = "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfGlass", "ShaderNodeBsdfPrincipled"
+BRASS, RED = (0.9, 0.7, 0.4), (0.7, 0.2, 0.15)
+
+
+def light():
+    world(SKY)
+    lamp("AREA", (2.5, 1.5, 6.0), (-0.25, 0.4, 0.0), 400.0, shape="SQUARE", size=1.5, color=LAMP)
+
+
+def of(kind, properties=None, **inputs):
+    return lambda name: material(name, kind, properties, **inputs)
+
+
+def principled(**inputs):
+    return of(PRINCIPLED, None, **{"Base_Color": RED, **inputs})
+
+
+def distribution(kind, name, **inputs):
+    return of(kind, {"distribution": name}, **inputs)
+
+
+def combined(kind, **inputs):
+    """Mix Shader or Add Shader of a diffuse and a glossy closure."""
+
+    def make(name):
+        from bpy import data
+
+        made = data.materials.new(name)
+        tree = tree_of(made)
+        first = node(tree, "ShaderNodeBsdfDiffuse", None, {"Color": (0.1, 0.3, 0.7)})
+        second = node(tree, GLOSSY, {"distribution": "GGX"}, {"Color": (0.3, 0.3, 0.3), "Roughness": 0.2})
+        both = node(tree, kind, None, inputs)
+        tree.links.new(first.outputs[0], both.inputs[-2])
+        tree.links.new(second.outputs[0], both.inputs[-1])
+        output(tree, both)
+        return made
+
+    return make
+
+
+SIMPLE = {
+    "diffuse": of("ShaderNodeBsdfDiffuse", Color=RED, Roughness=0.0),
+    "diffuse rough": of("ShaderNodeBsdfDiffuse", Color=RED, Roughness=0.8),
+    "translucent": of("ShaderNodeBsdfTranslucent", Color=RED),
+    "transparent": of("ShaderNodeBsdfTransparent", Color=(0.8, 0.5, 0.3)),
+    "emission": of("ShaderNodeEmission", Color=BRASS, Strength=2.0),
+    "mirror": distribution(GLOSSY, "GGX", Color=BRASS, Roughness=0.0),
+    "ggx 0.1": distribution(GLOSSY, "GGX", Color=BRASS, Roughness=0.1),
+    "ggx 0.5": distribution(GLOSSY, "GGX", Color=BRASS, Roughness=0.5),
+    "ggx 1.0": distribution(GLOSSY, "GGX", Color=BRASS, Roughness=1.0),
+    "multi ggx": distribution(GLOSSY, "MULTI_GGX", Color=BRASS, Roughness=0.6),
+    "beckmann": distribution(GLOSSY, "BECKMANN", Color=BRASS, Roughness=0.4),
+    "ashikhmin shirley": distribution(GLOSSY, "ASHIKHMIN_SHIRLEY", Color=BRASS, Roughness=0.4),
+    "anisotropic": distribution(GLOSSY, "GGX", Color=BRASS, Roughness=0.4, Anisotropy=0.7, Rotation=0.1),
+    "sheen microfiber": of("ShaderNodeBsdfSheen", {"distribution": "MICROFIBER"}, Color=BRASS, Roughness=0.4),
+    "sheen ashikhmin": of("ShaderNodeBsdfSheen", {"distribution": "ASHIKHMIN"}, Color=BRASS, Roughness=0.4),
+    "toon diffuse": of("ShaderNodeBsdfToon", {"component": "DIFFUSE"}, Color=RED, Size=0.5, Smooth=0.2),
+    "toon glossy": of("ShaderNodeBsdfToon", {"component": "GLOSSY"}, Color=RED, Size=0.5, Smooth=0.2),
+    "metallic f82": of("ShaderNodeBsdfMetallic", {"fresnel_type": "F82"}, Base_Color=BRASS, Roughness=0.3),
+    "metallic conductor": of("ShaderNodeBsdfMetallic", {"fresnel_type": "PHYSICAL_CONDUCTOR"}, Roughness=0.3),
+    "mix shader": combined("ShaderNodeMixShader", Fac=0.3),
+    "add shader": combined("ShaderNodeAddShader"),
+    "holdout": of("ShaderNodeHoldout"),
+}
+CLEAR = {
+    "glass 0": distribution(GLASS, "GGX", Roughness=0.0, IOR=1.5, Color=(0.9, 0.95, 1.0)),
+    "glass 0.1": distribution(GLASS, "GGX", Roughness=0.1, IOR=1.5, Color=(0.9, 0.95, 1.0)),
+    "glass 0.4": distribution(GLASS, "GGX", Roughness=0.4, IOR=1.5, Color=(0.9, 0.95, 1.0)),
+    "glass multi ggx": distribution(GLASS, "MULTI_GGX", Roughness=0.5, IOR=1.4),
+    "glass beckmann": distribution(GLASS, "BECKMANN", Roughness=0.3, IOR=1.5),
+    "glass ior 0.8": distribution(GLASS, "GGX", Roughness=0.2, IOR=0.8),
+    "refraction 0": of("ShaderNodeBsdfRefraction", {"distribution": "GGX"}, Roughness=0.0, IOR=1.4),
+    "refraction 0.3": of("ShaderNodeBsdfRefraction", {"distribution": "GGX"}, Roughness=0.3, IOR=1.4),
+    "refraction beckmann": of("ShaderNodeBsdfRefraction", {"distribution": "BECKMANN"}, Roughness=0.3, IOR=1.4),
+}
+LAYERED = {
+    "principled": principled(),
+    "principled 0.1": principled(Roughness=0.1),
+    "principled metal": principled(Base_Color=BRASS, Metallic=1.0, Roughness=0.3),
+    "principled half metal": principled(Metallic=0.5, Roughness=0.3),
+    "principled diffuse roughness": principled(Diffuse_Roughness=0.8),
+    "principled ior": principled(IOR=2.2, Roughness=0.2),
+    "principled specular level": principled(Specular_IOR_Level=0.9, Roughness=0.2),
+    "principled specular tint": principled(Specular_Tint=(1.0, 0.5, 0.2), Roughness=0.2),
+    "principled anisotropic": principled(Metallic=1.0, Anisotropic=0.8, Anisotropic_Rotation=0.2, Roughness=0.4),
+    "principled coat": principled(Coat_Weight=1.0, Coat_Roughness=0.1),
+    "principled tinted coat": principled(Coat_Weight=0.7, Coat_Roughness=0.3, Coat_Tint=(0.9, 0.6, 0.3), Coat_IOR=1.7),
+    "principled sheen": principled(Sheen_Weight=0.8, Sheen_Roughness=0.4, Sheen_Tint=BRASS),
+    "principled glass": principled(Base_Color=(0.9, 0.95, 1.0), Transmission_Weight=1.0, Roughness=0.0),
+    "principled rough glass": principled(Base_Color=(0.9, 0.95, 1.0), Transmission_Weight=1.0, Roughness=0.3),
+    "principled half glass": principled(Transmission_Weight=0.5, Roughness=0.2),
+    "principled emission": principled(Emission_Color=BRASS, Emission_Strength=0.6),
+    "principled alpha": principled(Alpha=0.4),
+    "principled thin film": principled(Roughness=0.2, Thin_Film_Thickness=400.0, Thin_Film_IOR=1.33),
+    "principled thin film metal": principled(Metallic=1.0, Roughness=0.2, Thin_Film_Thickness=300.0),
+    "principled thin wall": principled(Base_Color=(0.9, 0.95, 1.0), Transmission_Weight=1.0, Roughness=0.1, Thin_Wall=True),
+}
+
+
+def small_ball(made):
+    return ball(made, 0.42, rings=32)
+
+
+CASES = [
+    sheet("closures", SIMPLE, small_ball, light),
+    sheet("clear closures", CLEAR, small_ball, light, samples=128),
+    sheet("principled", LAYERED, small_ball, light),
+]

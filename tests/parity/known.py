@@ -1,0 +1,3 @@
+"""Where GI Engine is known to differ from Cycles, and why. Each is a row of docs/parity.md too."""
+
+KNOWN: dict[str, str] = {}

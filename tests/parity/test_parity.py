@@ -1,0 +1,28 @@
+"""GI Engine's path tracing against Cycles: each small scene, each tile of each sheet, must agree in every block."""
+
+import pytest
+
+from . import suite
+from .known import KNOWN
+
+
+def parameters():
+    for case in suite.CASES.values():
+        for index, tile in enumerate(case.tiles or [None]):
+            name = f"{case.name} / {tile}" if tile else case.name
+            reason = KNOWN.get(name)
+            marks = [pytest.mark.xfail(reason=reason, strict=False)] if reason else []
+            yield pytest.param(case, index, id=name, marks=marks)
+
+
+@pytest.mark.parametrize(("case", "index"), parameters())
+def test_agrees_with_cycles(case, index):
+    try:
+        pairs = suite.rendered(case.name)
+    except suite.Unavailable as error:
+        pytest.skip(f"this Blender has no {error}")
+    if case.tiles:
+        found = suite.tile_agreement(case, pairs, index)
+    else:
+        (found,) = suite.agreements(case.name)
+    assert found.agrees, str(found)
