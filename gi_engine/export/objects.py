@@ -154,14 +154,17 @@ def ray_visibility(item) -> int:
 
 
 def matrix_of(instance):
-    # Matrices are buffers from 5.0 on; before that, flattening in C is the fastest way to read one.
+    # Read in the cheapest way: as a whole from 5.0 on, where matrices are buffers; before that by flattening in C.
     if MATRICES_ARE_BUFFERS:
-        return np.array(instance.matrix_world, np.float32)
+        return instance.matrix_world.copy()
     return list(chain.from_iterable(instance.matrix_world))
 
 
 def stack_matrices(matrices: list) -> np.ndarray:
-    """(n, 4, 4) float32."""
+    """(n, 4, 4) float32, of what matrix_of gave."""
+    if MATRICES_ARE_BUFFERS:
+        columns = np.frombuffer(b"".join(matrices), np.float32).reshape(-1, 4, 4)
+        return np.ascontiguousarray(columns.transpose(0, 2, 1))
     return np.array(matrices, np.float32).reshape(-1, 4, 4)
 
 
@@ -179,11 +182,14 @@ def place(
 ) -> list[Instance]:
     """Instances of all prototypes that have a mesh; the three lists go by prototype."""
     instances = []
+    stacked = stack_matrices(list(chain.from_iterable(prototype.matrices for prototype in found.prototypes)))
+    every_good = usable(stacked)
+    end = 0
     for prototype, mesh, programs, values in zip(found.prototypes, meshes, slots, attributes, strict=True):
+        start, end = end, end + len(prototype.matrices)
         if mesh is None:
             continue
-        matrices, randoms = stack_matrices(prototype.matrices), randoms_of(prototype)
-        good = usable(matrices)
+        matrices, good, randoms = stacked[start:end], every_good[start:end], randoms_of(prototype)
         if not good.all():
             warnings.add("its matrix is singular or not finite; left out", prototype.name)
             matrices, randoms = matrices[good], randoms[good]
