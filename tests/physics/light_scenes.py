@@ -45,7 +45,9 @@ def mesh_of(triangles):
 
 def triangle_scene(triangles, program=None, world=None):
     programs = [program or emission()]
-    scene = sd.Scene(meshes=[mesh_of(triangles)], instances=[sd.Instance("triangles", 0, matrix(), [0])], programs=programs)
+    scene = sd.Scene(
+        meshes=[mesh_of(triangles)], instances=[sd.Instance("triangles", 0, matrix(), [0])], programs=programs
+    )
     return with_world(scene, world)
 
 

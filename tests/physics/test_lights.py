@@ -5,7 +5,20 @@ Chi² bins lie on the light, where densities are smooth, not on the sphere of di
 
 import numpy as np
 import pytest
-from light_scenes import NO_NORMAL, ORIGIN, UP, Samples, build, emission, f32, lamp, matrix, triangle_scene, uniforms, with_world
+from light_scenes import (
+    NO_NORMAL,
+    ORIGIN,
+    UP,
+    Samples,
+    build,
+    emission,
+    f32,
+    lamp,
+    matrix,
+    triangle_scene,
+    uniforms,
+    with_world,
+)
 from scipy import stats
 
 from gi_engine import scene_data as sd
@@ -85,7 +98,9 @@ class Equirectangular:
         return np.stack([np.sin(theta) * np.cos(a), np.sin(theta) * np.sin(a), -np.cos(theta)], 1)
 
     def place(self, d):
-        return np.arctan2(np.hypot(d[:, 0], d[:, 1]), -d[:, 2]) / np.pi, (np.arctan2(d[:, 1], d[:, 0]) + np.pi) / (2 * np.pi)
+        return np.arctan2(np.hypot(d[:, 0], d[:, 1]), -d[:, 2]) / np.pi, (np.arctan2(d[:, 1], d[:, 0]) + np.pi) / (
+            2 * np.pi
+        )
 
 
 def bin_masses(lights, surface, position, normal, bins, order=6, **options):
@@ -97,7 +112,11 @@ def bin_masses(lights, surface, position, normal, bins, order=6, **options):
 
     def direction(s, t):
         p = surface.point(s, t)
-        return p if getattr(surface, "direction", False) else (p - position) / np.linalg.norm(p - position, axis=1, keepdims=True)
+        return (
+            p
+            if getattr(surface, "direction", False)
+            else (p - position) / np.linalg.norm(p - position, axis=1, keepdims=True)
+        )
 
     h = 1e-6
     ds = (direction(s + h, t) - direction(s - h, t)) / (2 * h)
@@ -111,7 +130,10 @@ def bin_masses(lights, surface, position, normal, bins, order=6, **options):
 def chi2_p_value(observed, expected):
     few = expected < 5
     if few.any():
-        observed, expected = np.append(observed[~few], observed[few].sum()), np.append(expected[~few], expected[few].sum())
+        observed, expected = (
+            np.append(observed[~few], observed[few].sum()),
+            np.append(expected[~few], expected[few].sum()),
+        )
     if expected[-1] < 5:
         observed[-2] += observed[-1]
         expected[-2] += expected[-1]
@@ -130,7 +152,9 @@ def surface_p_value(lights, surface, position, normal, bins=BINS, **options):
     mass = bin_masses(lights, surface, position, normal, bins, **options)
     assert mass.sum() < 1.002, f"the density integrates to {mass.sum():.5f}"
     expected = mass * SAMPLES
-    return chi2_p_value(np.append(observed, SAMPLES - observed.sum()), np.append(expected, max(1 - mass.sum(), 0) * SAMPLES))
+    return chi2_p_value(
+        np.append(observed, SAMPLES - observed.sum()), np.append(expected, max(1 - mass.sum(), 0) * SAMPLES)
+    )
 
 
 # ---------------------------------------------------------------- cases
@@ -141,7 +165,17 @@ TILTED = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])  # columns x y z
 
 def area_case(position=(0, 0, 2), x=(1, 0, 0), y=(0, 1, 0), z=(0, 0, 1), size=(1.0, 2.0), ellipse=False, **fields):
     surface = (Ellipse if ellipse else Rectangle)(position, np.array(x) * size[0], np.array(y) * size[1])
-    return sd.Scene(lights=[lamp("AREA", matrix=matrix(position, x, y, z), size=size, shape="ELLIPSE" if ellipse else "RECTANGLE", **fields)]), surface
+    return sd.Scene(
+        lights=[
+            lamp(
+                "AREA",
+                matrix=matrix(position, x, y, z),
+                size=size,
+                shape="ELLIPSE" if ellipse else "RECTANGLE",
+                **fields,
+            )
+        ]
+    ), surface
 
 
 def sphere_case(kind, center, radius, **fields):
@@ -188,7 +222,10 @@ CASES = {
     "spot with a sphere": sphere_case("SPOT", (0, 0, 2), 0.3, spot_size=2.0),
     "facing disk": facing_disk_case((1, 0.5, 2), 0.7),
     "sun": (sd.Scene(lights=[lamp("SUN", angle=0.5)]), Cap((0, 0, 1), 0.25)),
-    "sun as seen from Earth": (sd.Scene(lights=[lamp("SUN", angle=0.00918, matrix=matrix(x=TILTED[:, 0], y=TILTED[:, 1], z=TILTED[:, 2]))]), Cap(TILTED[:, 2], 0.00459)),
+    "sun as seen from Earth": (
+        sd.Scene(lights=[lamp("SUN", angle=0.00918, matrix=matrix(x=TILTED[:, 0], y=TILTED[:, 1], z=TILTED[:, 2]))]),
+        Cap(TILTED[:, 2], 0.00459),
+    ),
     "triangle": triangle_case((-1, -0.5, 2), (1, -0.3, 1.5), (0.1, 1, 2.5)),
     "triangle close": triangle_case((-1, -0.8, 0.1), (1, -0.8, 0.1), (0.1, 2, 0.1)),
     "triangle far": triangle_case((-1, -0.5, 90), (1, -0.3, 90), (0.1, 1, 91)),
@@ -254,26 +291,47 @@ POINT_E = K / (4 * np.pi * 4)
 CLOSED = {
     "rectangle": (area_case(color=(K,) * 3)[0], K / 2 * 4 * corner_factor(0.5, 1, 2)),
     "rectangle, corner above": (area_case(position=(0.5, 1, 1.5), color=(K,) * 3)[0], K / 2 * corner_factor(1, 2, 1.5)),
-    "rectangle scaled by its object": (area_case(x=(3, 0, 0), y=(0, 0.5, 0), color=(K,) * 3)[0], K / 3 * 4 * corner_factor(1.5, 0.5, 2)),
+    "rectangle scaled by its object": (
+        area_case(x=(3, 0, 0), y=(0, 0.5, 0), color=(K,) * 3)[0],
+        K / 3 * 4 * corner_factor(1.5, 0.5, 2),
+    ),
     "rectangle mirrored": (area_case(x=(-1, 0, 0), color=(K,) * 3)[0], K / 2 * 4 * corner_factor(0.5, 1, 2)),
     "rectangle not normalised": (area_case(color=(K,) * 3, normalize=False)[0], K * 4 * corner_factor(0.5, 1, 2)),
     "rectangle from behind": (area_case(z=(0, 0, -1), color=(K,) * 3)[0], 0),
     "disk": (area_case(size=(2, 2), ellipse=True, color=(K,) * 3)[0], K / np.pi * disk_factor(1, 2, 0)),
-    "disk aside": (area_case(position=(0.7, 0, 2), size=(2, 2), ellipse=True, color=(K,) * 3)[0], K / np.pi * disk_factor(1, 2, 0.7)),
-    "spread 60°": (area_case(size=(2, 2), ellipse=True, spread=np.pi / 3, color=(K,) * 3)[0], spread_irradiance(K, np.pi, np.pi / 6, 2, 1)),
-    "spread 20°, wide lamp": (area_case(size=(4, 3), spread=np.pi / 9, color=(K,) * 3)[0], spread_irradiance(K, 12, np.pi / 18, 2, 9)),
+    "disk aside": (
+        area_case(position=(0.7, 0, 2), size=(2, 2), ellipse=True, color=(K,) * 3)[0],
+        K / np.pi * disk_factor(1, 2, 0.7),
+    ),
+    "spread 60°": (
+        area_case(size=(2, 2), ellipse=True, spread=np.pi / 3, color=(K,) * 3)[0],
+        spread_irradiance(K, np.pi, np.pi / 6, 2, 1),
+    ),
+    "spread 20°, wide lamp": (
+        area_case(size=(4, 3), spread=np.pi / 9, color=(K,) * 3)[0],
+        spread_irradiance(K, 12, np.pi / 18, 2, 9),
+    ),
     "spread 2°": (area_case(size=(4, 3), spread=np.pi / 90, color=(K,) * 3)[0], K / 12),
     "spread 0": (area_case(size=(4, 3), spread=0, color=(K,) * 3)[0], K / 12),
     "point": (sd.Scene(lights=[lamp("POINT", (K,) * 3)]), POINT_E),
     "point not normalised": (sd.Scene(lights=[lamp("POINT", (K,) * 3, normalize=False)]), 4 * POINT_E),
     "sphere": (sd.Scene(lights=[lamp("POINT", (K,) * 3, radius=0.8, soft_falloff=False)]), POINT_E),
-    "sphere not normalised": (sd.Scene(lights=[lamp("POINT", (K,) * 3, radius=0.8, soft_falloff=False, normalize=False)]), K * 0.64 / 4),
+    "sphere not normalised": (
+        sd.Scene(lights=[lamp("POINT", (K,) * 3, radius=0.8, soft_falloff=False, normalize=False)]),
+        K * 0.64 / 4,
+    ),
     "soft falloff": (sd.Scene(lights=[lamp("POINT", (K,) * 3, radius=0.8)]), POINT_E * 4 / (4 + 0.64)),
     "spot": (sd.Scene(lights=[lamp("SPOT", (K,) * 3, spot_size=0.5)]), POINT_E),
-    "spot with a sphere": (sd.Scene(lights=[lamp("SPOT", (K,) * 3, spot_size=1.5, radius=0.2, soft_falloff=False)]), POINT_E),
+    "spot with a sphere": (
+        sd.Scene(lights=[lamp("SPOT", (K,) * 3, spot_size=1.5, radius=0.2, soft_falloff=False)]),
+        POINT_E,
+    ),
     "sun": (sd.Scene(lights=[lamp("SUN", (K,) * 3)]), K),
     "sun, wide": (sd.Scene(lights=[lamp("SUN", (K,) * 3, angle=1.0)]), K),
-    "sun not normalised": (sd.Scene(lights=[lamp("SUN", (K,) * 3, angle=1.0, normalize=False)]), K * np.pi * np.sin(0.5) ** 2),
+    "sun not normalised": (
+        sd.Scene(lights=[lamp("SUN", (K,) * 3, angle=1.0, normalize=False)]),
+        K * np.pi * np.sin(0.5) ** 2,
+    ),
     "uniform sky": (with_world(sd.Scene(), emission(strength=K)), K * np.pi),
     "nori triangle": (triangle_scene([[(-1, -1, 2), (1, -1, 2), (0, 1, 2)]], emission(strength=K)), None),
 }
@@ -315,24 +373,51 @@ def test_spot_squeezed_by_its_object():
     assert lit.tolist() == [True, False, True, False]
 
 
+def painted(kind):
+    """Emission that changes from place to place: red is the x coordinate of `kind`."""
+    builder = ProgramBuilder()
+    builder.op("emission", 1.0, builder.op(kind), 1.0)
+    return builder.finish("painted")
+
+
 # Partly covered lamps: no closed form, so sampled light against light found by uniform directions.
 FOUND = {
     "spread, half over the edge": area_case(position=(0.9, 0.3, 2), size=(2, 1), spread=1.0),
     "spread, ellipse half over the edge": area_case(position=(0.9, 0.3, 2), size=(2, 1), spread=1.0, ellipse=True),
     "spread, disk half over the edge": area_case(position=(0.9, 0.3, 2), size=(2, 2), spread=0.8, ellipse=True),
-    "spot through a facing disk": (sd.Scene(lights=[lamp("SPOT", radius=0.9, spot_size=0.6, spot_blend=0.5, matrix=matrix((0.3, 0, 2)))]), None),
-    "spot through a large sphere": (sd.Scene(lights=[lamp("SPOT", radius=1.8, soft_falloff=False, spot_size=0.4, spot_blend=0.5)]), None),
+    "spot through a facing disk": (
+        sd.Scene(lights=[lamp("SPOT", radius=0.9, spot_size=0.6, spot_blend=0.5, matrix=matrix((0.3, 0, 2)))]),
+        None,
+    ),
+    "spot through a large sphere": (
+        sd.Scene(lights=[lamp("SPOT", radius=1.8, soft_falloff=False, spot_size=0.4, spot_blend=0.5)]),
+        None,
+    ),
     "sheared ellipse": area_case((0.1, 0, 1), y=(0.7, 1, 0), ellipse=True),
     "many at once": (
         with_world(
             sd.Scene(
-                lights=[lamp("POINT", (K,) * 3, radius=0.5), lamp("AREA", (3,) * 3, size=(1, 1), matrix=matrix((1, 1, 1))), lamp("SUN", angle=0.8)],
+                lights=[
+                    lamp("POINT", (K,) * 3, radius=0.5),
+                    lamp("AREA", (3,) * 3, size=(1, 1), matrix=matrix((1, 1, 1))),
+                    lamp("SUN", angle=0.8),
+                ],
                 meshes=triangle_scene([[(-1, -0.5, 2), (1, -0.3, 1.5), (0.1, 1, 2.5)]]).meshes,
                 instances=[sd.Instance("triangles", 0, matrix(), [0])],
                 programs=[emission(strength=3)],
             ),
             emission(strength=0.1, name="world"),
         ),
+        None,
+    ),
+    "painted triangles": (
+        triangle_scene(
+            [[(1, -1, 2), (3, -1, 1), (2, 2, 2)], [(0, 0, 1), (0.5, 0, 1), (0, 0.5, 1)]], painted("position")
+        ),
+        None,
+    ),
+    "painted lamp": (
+        sd.Scene(lights=[lamp("AREA", program=0, matrix=matrix((0.5, 0, 1)))], programs=[painted("position")]),
         None,
     ),
     "two lamps in one place": (sd.Scene(lights=[lamp("AREA"), lamp("AREA", (2, 2, 2))]), None),
@@ -349,16 +434,52 @@ def test_sampled_irradiance_is_what_rays_find(name):
     found = np.pi * lights.eval(ORIGIN, UP, wi)[:, 0].astype(float)
     mean, error = Samples(lights.sample(ORIGIN, UP, uniforms(200_000, 6))).irradiance(UP)
     both = np.hypot(error, found.std() / np.sqrt(n))
-    assert abs(mean - found.mean()) < 4 * both + 1e-4 * mean, f"sampled {mean:.5f}, found {found.mean():.5f} ± {both:.5f}"
+    assert abs(mean - found.mean()) < 4 * both + 1e-4 * mean, (
+        f"sampled {mean:.5f}, found {found.mean():.5f} ± {both:.5f}"
+    )
 
 
 # ---------------------------------------------------------------- world
 
 
-def sun_in_the_sky(resolution):
-    """A world with a bright band: strength 1 + 50 where the direction's z passes .8."""
-    b = ProgramBuilder()
-    return b, resolution
+def image_sky(resolution=64, sun=2000.0, **fields):
+    """A gradient with one bright pixel."""
+    height, width = resolution // 2, resolution
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., :3] *= np.linspace(0.0, 1.0, height, dtype=np.float32)[:, None, None]
+    pixels[height * 3 // 4, width // 3, :3] = sun
+    builder = ProgramBuilder()
+    color, _ = builder.op("environment", builder.op("object_position"), imm=(0, 0, 0))
+    builder.op("emission", 1.0, color, 1.0)
+    scene = sd.Scene(images=[[sd.Image("sky", pixels)]])
+    return with_world(scene, builder.finish("sky"), **fields)
+
+
+@pytest.mark.parametrize("resolution", [64, 32])
+def test_world_samples_follow_their_density(resolution):
+    lights = build(image_sky(sampling="MANUAL", map_resolution=resolution))
+    assert surface_p_value(lights, Equirectangular(), ORIGIN, UP, bins=64) > SIGNIFICANCE
+
+
+@pytest.mark.parametrize("fields", [{}, {"sampling": "MANUAL", "map_resolution": 48}])
+def test_world_map_finds_all_light(fields):
+    lights = build(image_sky(**fields))
+    n = 1500
+    s, t = (a.ravel() for a in np.meshgrid((np.arange(n) + 0.5) / n, (np.arange(n) + 0.5) / n, indexing="ij"))
+    wi = Equirectangular().point(s, t).astype(np.float32)
+    weight = np.maximum(wi[:, 2], 0) * np.sin(np.pi * s) * (2 * np.pi**2 / n**2)
+    expected = (lights.eval(ORIGIN, UP, wi)[:, 0] * weight).sum()
+    mean, error = Samples(lights.sample(ORIGIN, UP, uniforms(100_000, 4))).irradiance(UP)
+    assert abs(mean - expected) < 4 * error + 2e-3 * expected
+    # Directions drawn without the map would be off by thirty times as much.
+    assert error < 0.01 * expected
+
+
+def test_world_without_sampling_is_left_to_rays():
+    lights = build(image_sky(sampling="NONE"))
+    assert lights.count == 0
+    found = lights.eval(ORIGIN, UP, f32((0, 0.6, 0.8)))[0]
+    assert found[0] > 0 and found[3] == 0
 
 
 # ---------------------------------------------------------------- choosing
@@ -368,7 +489,9 @@ def many_lights(n, seed=3):
     rng = np.random.default_rng(seed)
     center = rng.uniform(-5, 5, (n, 1, 3))
     triangles = center + rng.normal(0, 0.2, (n, 3, 3))
-    lamps = [lamp("POINT", tuple(rng.uniform(1, 50, 3)), matrix=matrix(p), radius=0.1) for p in rng.uniform(-5, 5, (10, 3))]
+    lamps = [
+        lamp("POINT", tuple(rng.uniform(1, 50, 3)), matrix=matrix(p), radius=0.1) for p in rng.uniform(-5, 5, (10, 3))
+    ]
     lamps.append(lamp("SPOT", (20,) * 3, matrix=matrix((1, 1, 3)), spot_size=0.6))
     lamps.append(lamp("SUN", (0.3,) * 3))
     scene = triangle_scene(triangles, emission(strength=5))
@@ -391,7 +514,10 @@ def test_choice_follows_its_probabilities(normal):
         always &= p * SAMPLES > 20
         assert p[always].sum() > 0.5
         rest = SAMPLES - observed[always].sum()
-        assert chi2_p_value(np.append(observed[always], rest), np.append(p[always], 1 - p[always].sum()) * SAMPLES) > SIGNIFICANCE / 8
+        assert (
+            chi2_p_value(np.append(observed[always], rest), np.append(p[always], 1 - p[always].sum()) * SAMPLES)
+            > SIGNIFICANCE / 8
+        )
 
 
 def test_choice_sums_to_one_where_every_light_shines():
@@ -411,7 +537,9 @@ def test_choice_loses_no_light():
     """Sum over all lights, one by one, against choosing among them."""
     lights = build(many_lights(60))
     for position in np.random.default_rng(8).uniform(-4, 4, (3, 1, 3)).astype(np.float32):
-        each = [Samples(lights.sample(position, UP, uniforms(4000, k), light=k)).irradiance(UP) for k in range(lights.count)]
+        each = [
+            Samples(lights.sample(position, UP, uniforms(4000, k), light=k)).irradiance(UP) for k in range(lights.count)
+        ]
         mean, error = Samples(lights.sample(position, UP, uniforms(400_000, 9))).irradiance(UP)
         expected, spread = sum(m for m, _ in each), np.sqrt(sum(e * e for _, e in each))
         assert abs(mean - expected) < 4 * np.hypot(error, spread), f"{mean} against {expected}"
@@ -422,7 +550,10 @@ def test_choice_loses_no_light():
 
 def test_emissive_triangles_shine_on_both_sides():
     corners = [(-1, -0.5, 2), (1, -0.3, 1.5), (0.1, 1, 2.5)]
-    a, b = (Samples(build(triangle_scene([c])).sample(ORIGIN, UP, uniforms(1000))).irradiance(UP)[0] for c in (corners, corners[::-1]))
+    a, b = (
+        Samples(build(triangle_scene([c])).sample(ORIGIN, UP, uniforms(1000))).irradiance(UP)[0]
+        for c in (corners, corners[::-1])
+    )
     assert a > 0
     np.testing.assert_allclose(a, b, rtol=0.01)
 
@@ -440,7 +571,9 @@ def test_emission_sampling_decides_which_side_is_sampled(sampling, lights):
     lit = built.sample(position, NO_NORMAL, uniforms(2))[:, 9] >= 0
     assert lit.tolist() == {"FRONT": [False, True], "BACK": [True, False]}.get(sampling, [True, True])
     # What is not sampled is left to rays, with full weight.
-    found = np.stack([built.eval(position[i : i + 1], NO_NORMAL, f32(d))[0] for i, d in enumerate([(0, 0, 1), (0, 0, -1)])])
+    found = np.stack(
+        [built.eval(position[i : i + 1], NO_NORMAL, f32(d))[0] for i, d in enumerate([(0, 0, 1), (0, 0, -1)])]
+    )
     assert (found[:, 0] > 0).all()
     assert ((found[:, 3] > 0) == lit).all()
 
@@ -462,9 +595,28 @@ def test_lamps_without_power_or_size_are_left_out():
 
 
 @pytest.mark.parametrize("kind", ["POINT", "SPOT", "AREA", "SUN"])
-@pytest.mark.parametrize("fields", [{}, {"radius": 0.0}, {"radius": 1e-20}, {"radius": 1e20}, {"angle": np.pi * 2}, {"spot_size": np.pi}, {"spot_size": 0.0}, {"size": (1e-20, 1)}, {"spread": 1e-6}])
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"radius": 0.0},
+        {"radius": 1e-20},
+        {"radius": 1e20},
+        {"angle": np.pi * 2},
+        {"spot_size": np.pi},
+        {"spot_size": 0.0},
+        {"size": (1e-20, 1)},
+        {"spread": 1e-6},
+    ],
+)
 def test_extreme_lamps_give_finite_light(kind, fields):
-    for m in (matrix(), matrix((0, 0, 1e-20)), matrix((0, 0, 1e15)), matrix(z=(0, 0, 0)), matrix((0, 0, 1), x=(1e-12, 0, 0))):
+    for m in (
+        matrix(),
+        matrix((0, 0, 1e-20)),
+        matrix((0, 0, 1e15)),
+        matrix(z=(0, 0, 0)),
+        matrix((0, 0, 1), x=(1e-12, 0, 0)),
+    ):
         lights = build(sd.Scene(lights=[lamp(kind, matrix=m, **fields)]))
         table = lights.sample(ORIGIN, UP, uniforms(200))
         table = table[table[:, 9] >= 0]
@@ -484,9 +636,17 @@ def test_rays_see_only_lamps_that_show_themselves_to_them():
     wi = f32((0, 0, 1))
     camera, diffuse, glossy = sd.CAMERA, sd.DIFFUSE, sd.GLOSSY
     lights = build(sd.Scene(lights=[lamp("AREA", visibility=diffuse)]))
-    assert [lights.eval(ORIGIN, UP, wi, visibility=v)[0, 0] > 0 for v in (camera, diffuse, glossy)] == [False, True, False]
+    assert [lights.eval(ORIGIN, UP, wi, visibility=v)[0, 0] > 0 for v in (camera, diffuse, glossy)] == [
+        False,
+        True,
+        False,
+    ]
     lights = build(sd.Scene(lights=[lamp("AREA", use_mis=False, visibility=camera | diffuse)]))
-    assert [lights.eval(ORIGIN, UP, wi, visibility=v)[0, 0] > 0 for v in (camera, diffuse, glossy)] == [True, False, False]
+    assert [lights.eval(ORIGIN, UP, wi, visibility=v)[0, 0] > 0 for v in (camera, diffuse, glossy)] == [
+        True,
+        False,
+        False,
+    ]
 
 
 def test_lamps_are_found_among_many():

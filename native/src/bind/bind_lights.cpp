@@ -53,7 +53,7 @@ class TestLights {
       float* row = data + 10 * i;
       row[9] = -1;
       if (!s) continue;
-      const float values[10] = {s->wi.x,      s->wi.y,      s->wi.z,    s->distance,       s->radiance.r,
+      const float values[10] = {s->wi.x,       s->wi.y,       s->wi.z,    s->distance,        s->radiance.r,
                                 s->radiance.g, s->radiance.b, s->pdf_dir, float(s->is_delta), float(s->light)};
       std::copy(values, values + 10, row);
     }
@@ -140,8 +140,10 @@ class TestLights {
 void bind_lights(nb::module_& m) {
   nb::class_<TestLights>(m, "TestLights")
       .def(nb::init<nb::handle, const std::string&, int>(), nb::arg("scene"), nb::arg("embree"), nb::arg("threads") = 0)
-      .def("sample", &TestLights::sample, nb::arg("position"), nb::arg("normal"), nb::arg("u"), nb::arg("light") = -1, nb::arg("transmission") = false)
-      .def("eval", &TestLights::eval, nb::arg("position"), nb::arg("normal"), nb::arg("wi"), nb::arg("transmission") = false, nb::arg("visibility") = uint32_t(kRayDiffuse))
+      .def("sample", &TestLights::sample, nb::arg("position"), nb::arg("normal"), nb::arg("u"), nb::arg("light") = -1,
+           nb::arg("transmission") = false)
+      .def("eval", &TestLights::eval, nb::arg("position"), nb::arg("normal"), nb::arg("wi"), nb::arg("transmission") = false,
+           nb::arg("visibility") = uint32_t(kRayDiffuse))
       .def("pick_probabilities", &TestLights::pick_probabilities, nb::arg("position"), nb::arg("normal"), nb::arg("transmission") = false)
       .def("time", &TestLights::time)
       .def_prop_ro("count", &TestLights::count)

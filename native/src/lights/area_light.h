@@ -104,8 +104,11 @@ struct AreaLight {
   }
 
   Part reachable(Vec3 position, float height) const {
-    const Part whole{!orthogonal ? ellipse ? Part::kEllipse : Part::kParallelogram : ellipse ? Part::kEllipse : Part::kRectangle,
-                     {0, 0}, {size_u, size_v}};
+    const Part whole{!orthogonal ? ellipse ? Part::kEllipse : Part::kParallelogram
+                     : ellipse   ? Part::kEllipse
+                                 : Part::kRectangle,
+                     {0, 0},
+                     {size_u, size_v}};
     const float reach = slats ? height * tan_spread : kInf;  // radius of the circle above the point that can send light
     if (!orthogonal || !(reach < std::max(size_u, size_v) * 4.0f + 1e3f * height)) return whole;
     const Vec3 d = position - center;

@@ -52,8 +52,8 @@ class LampBvh {
     for (uint32_t i = begin; i < end; ++i) box.add(items_[i].box), centers.add(items_[i].box.center());
     // Flat lamps: room for rounding.
     const Vec3 e = box.extent();
-    const float pad = 1e-5f * (std::max({e.x, e.y, e.z}) + std::max({std::abs(box.lo.x), std::abs(box.lo.y), std::abs(box.lo.z), std::abs(box.hi.x),
-                                                                     std::abs(box.hi.y), std::abs(box.hi.z)}));
+    const float pad = 1e-5f * (std::max({e.x, e.y, e.z}) + std::max({std::abs(box.lo.x), std::abs(box.lo.y), std::abs(box.lo.z),
+                                                                     std::abs(box.hi.x), std::abs(box.hi.y), std::abs(box.hi.z)}));
     box.lo = box.lo - Vec3{pad, pad, pad}, box.hi = box.hi + Vec3{pad, pad, pad};
     nodes_[node].box = box;
     if (end - begin <= kLeafSize) {

@@ -9,9 +9,7 @@ namespace {
 
 float sin_from(float c) { return safe_sqrt(1.0f - c * c); }
 // cos and sin of max(0, a − b).
-float cos_difference(float cos_a, float cos_b) {
-  return cos_a > cos_b ? 1.0f : cos_a * cos_b + sin_from(cos_a) * sin_from(cos_b);
-}
+float cos_difference(float cos_a, float cos_b) { return cos_a > cos_b ? 1.0f : cos_a * cos_b + sin_from(cos_a) * sin_from(cos_b); }
 
 struct Cone {
   Vec3 axis;

@@ -31,10 +31,14 @@ struct Lamp {
 
 Shape make_shape(const LampData& lamp) {
   switch (lamp.kind) {
-    case LampKind::kSpot: return SpotLight(lamp);
-    case LampKind::kArea: return AreaLight(lamp);
-    case LampKind::kSun: return SunLight(lamp);
-    case LampKind::kPoint: break;
+    case LampKind::kSpot:
+      return SpotLight(lamp);
+    case LampKind::kArea:
+      return AreaLight(lamp);
+    case LampKind::kSun:
+      return SunLight(lamp);
+    case LampKind::kPoint:
+      break;
   }
   return PointLight(lamp);
 }
@@ -63,15 +67,17 @@ void bound(const AreaLight& light, LightBounds& b) {
 void bound(const SunLight&, LightBounds&) {}
 
 float hardness(const Shape& shape) {  // what a lamp of colour 1 weighs: 0 leaves it out
-  return std::visit([](const auto& s) {
-    if constexpr (std::is_same_v<std::decay_t<decltype(s)>, SunLight>) {
-      return s.irradiance();
-    } else {
-      LightBounds b;
-      bound(s, b);
-      return b.power;
-    }
-  }, shape);
+  return std::visit(
+      [](const auto& s) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(s)>, SunLight>) {
+          return s.irradiance();
+        } else {
+          LightBounds b;
+          bound(s, b);
+          return b.power;
+        }
+      },
+      shape);
 }
 
 PathState seen_by_light(PathState path, float distance) {
@@ -122,19 +128,23 @@ struct LightSet::Impl {
       Lamp lamp{make_shape(data), &data, data.matrix.inverse(), false};
       const float weight = hardness(lamp.shape);
       if (!(weight > 0.0f) || !std::isfinite(weight)) continue;
-      std::visit([&](const auto& shape) {
-        using S = std::decay_t<decltype(shape)>;
-        if constexpr (std::is_same_v<S, SunLight>) {
-          lamp.findable = shape.has_shape();
-          suns.push_back(uint32_t(lamps.size()));
-        } else {
-          if constexpr (std::is_same_v<S, SpotLight>) lamp.findable = shape.point.has_shape();
-          else lamp.findable = shape.has_shape();
-          LightBounds b;
-          bound(shape, b);
-          if (lamp.findable) items.push_back({b.box(), uint32_t(lamps.size())});
-        }
-      }, lamp.shape);
+      std::visit(
+          [&](const auto& shape) {
+            using S = std::decay_t<decltype(shape)>;
+            if constexpr (std::is_same_v<S, SunLight>) {
+              lamp.findable = shape.has_shape();
+              suns.push_back(uint32_t(lamps.size()));
+            } else {
+              if constexpr (std::is_same_v<S, SpotLight>)
+                lamp.findable = shape.point.has_shape();
+              else
+                lamp.findable = shape.has_shape();
+              LightBounds b;
+              bound(shape, b);
+              if (lamp.findable) items.push_back({b.box(), uint32_t(lamps.size())});
+            }
+          },
+          lamp.shape);
       lamps.push_back(lamp);
     }
     bvh = LampBvh(std::move(items));
@@ -268,7 +278,8 @@ struct LightSet::Impl {
     if (emission_is_constant[triangle.material]) {
       s.radiance = constant_emission[triangle.material];
     } else {
-      ShadingPoint p = scene.surface_point(triangle.instance, triangle.triangle, t->b1, t->b2, -t->wi, seen_by_light(query.path, t->distance));
+      ShadingPoint p =
+          scene.surface_point(triangle.instance, triangle.triangle, t->b1, t->b2, -t->wi, seen_by_light(query.path, t->distance));
       s.radiance = scene.emission(p);
     }
     set_scales(s, scene.instances()[triangle.instance].data->visibility, 1, 1, 1);
@@ -295,10 +306,14 @@ struct LightSet::Impl {
   std::optional<float> meet(uint32_t index, const Ray& ray, uint32_t visibility) const {
     const Lamp& lamp = lamps[index];
     if (!(lamp.data->visibility & visibility) || !(lamp.data->use_mis || (visibility & kRayCamera))) return std::nullopt;
-    return std::visit([&](const auto& s) -> std::optional<float> {
-      if constexpr (std::is_same_v<std::decay_t<decltype(s)>, SunLight>) return std::nullopt;
-      else return s.intersect(ray);
-    }, lamp.shape);
+    return std::visit(
+        [&](const auto& s) -> std::optional<float> {
+          if constexpr (std::is_same_v<std::decay_t<decltype(s)>, SunLight>)
+            return std::nullopt;
+          else
+            return s.intersect(ray);
+        },
+        lamp.shape);
   }
 };
 
@@ -342,12 +357,14 @@ LightEval LightSet::eval_lamp(const LightQuery& from, const Ray& ray, const Lamp
   const Vec3 wi = ray.direction;
   if (from.path.depth > lamp.data->max_bounces) return {};
   LightEval e;
-  std::visit([&](const auto& s) {
-    if constexpr (!std::is_same_v<std::decay_t<decltype(s)>, SunLight>) {
-      e.radiance = lamp.data->color * s.radiance(ray.origin, wi);
-      e.pdf_dir = s.pdf_dir(from, wi);
-    }
-  }, lamp.shape);
+  std::visit(
+      [&](const auto& s) {
+        if constexpr (!std::is_same_v<std::decay_t<decltype(s)>, SunLight>) {
+          e.radiance = lamp.data->color * s.radiance(ray.origin, wi);
+          e.pdf_dir = s.pdf_dir(from, wi);
+        }
+      },
+      lamp.shape);
   if (is_black(e.radiance)) return {};
   e.radiance = e.radiance * impl_->lamp_program(lamp, ray.origin, wi, hit.t, seen_by_light(from.path, hit.t));
   e.pdf_dir *= impl_->pick_probability(from, hit.lamp);
@@ -381,7 +398,8 @@ float LightSet::pdf_world(const LightQuery& from, Vec3 direction) const {
 
 std::string LightSet::description() const {
   return std::to_string(impl_->lamps.size()) + " lamps, " + std::to_string(impl_->triangles.size()) + " emissive triangles, " +
-         (impl_->world.emits() ? impl_->world.map_width() ? "world map " + std::to_string(impl_->world.map_width()) : "uniform world" : "no world");
+         (impl_->world.emits() ? impl_->world.map_width() ? "world map " + std::to_string(impl_->world.map_width()) : "uniform world"
+                               : "no world");
 }
 
 }  // namespace gi

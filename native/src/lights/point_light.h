@@ -13,7 +13,9 @@ struct PointLight {
   static constexpr float kLeastRadius = 1e-9f;  // smaller ones would overflow single precision
 
   explicit PointLight(const LampData& lamp)
-      : center(lamp.matrix.translation()), radius(lamp.radius > kLeastRadius ? lamp.radius : 0.0f), sphere(!lamp.soft_falloff && radius > 0.0f) {
+      : center(lamp.matrix.translation()),
+        radius(lamp.radius > kLeastRadius ? lamp.radius : 0.0f),
+        sphere(!lamp.soft_falloff && radius > 0.0f) {
     const float area = radius > 0.0f ? 4.0f * kPi * radius * radius : 4.0f;
     scale = kInvPi / (lamp.normalize ? area : 1.0f);
   }

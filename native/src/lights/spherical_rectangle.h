@@ -8,7 +8,8 @@ namespace gi {
 class SphericalRectangle {
  public:
   // `u`, `v`: unit, orthogonal; the rectangle is `size` wide along them about `middle`.
-  SphericalRectangle(Vec3 from, Vec3 middle, Vec3 u, Vec3 v, Vec2 size) : from_(from), u_(u), v_(v), n_(cross(u, v)), area_(size.x * size.y) {
+  SphericalRectangle(Vec3 from, Vec3 middle, Vec3 u, Vec3 v, Vec2 size)
+      : from_(from), u_(u), v_(v), n_(cross(u, v)), area_(size.x * size.y) {
     const Vec3 d = middle - from;
     x_ = dot(d, u), y_ = dot(d, v), z_ = dot(d, n_);
     if (z_ > 0.0f) n_ = -n_, z_ = -z_;

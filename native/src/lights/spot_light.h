@@ -13,8 +13,7 @@ struct SpotLight {
   float edge = 0;      // 1 / width of the blend, in cosine; 0 is a hard edge
   float one_minus_cos_world = 2;  // of the narrowest circular cone in the world that holds all of it
 
-  explicit SpotLight(const LampData& lamp)
-      : point(lamp), to_lamp(lamp.matrix.inverse()), axis(normalize(-lamp.matrix.column(2))) {
+  explicit SpotLight(const LampData& lamp) : point(lamp), to_lamp(lamp.matrix.inverse()), axis(normalize(-lamp.matrix.column(2))) {
     const float half = std::clamp(0.5f * lamp.spot_size, 0.0f, kPi);
     cos_half = std::cos(half);
     const float width = (1.0f - cos_half) * lamp.spot_blend;
@@ -22,7 +21,8 @@ struct SpotLight {
     const float squeeze = std::max(length_squared(lamp.matrix.column(0)), length_squared(lamp.matrix.column(1)));
     const float depth = length_squared(lamp.matrix.column(2));
     // Sheared or very wide cones: all directions.
-    const bool orthogonal = std::abs(dot(axis, lamp.matrix.column(0))) + std::abs(dot(axis, lamp.matrix.column(1))) < 1e-4f * std::sqrt(squeeze);
+    const bool orthogonal =
+        std::abs(dot(axis, lamp.matrix.column(0))) + std::abs(dot(axis, lamp.matrix.column(1))) < 1e-4f * std::sqrt(squeeze);
     if (orthogonal && half < 0.49f * kPi && depth > 0.0f) {
       one_minus_cos_world = one_minus_cos_from_sin2(squeeze * sqr(std::tan(half)) / (squeeze * sqr(std::tan(half)) + depth));
     }
