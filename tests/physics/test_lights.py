@@ -464,7 +464,7 @@ def test_world_samples_follow_their_density(resolution):
 @pytest.mark.parametrize("fields", [{}, {"sampling": "MANUAL", "map_resolution": 48}])
 def test_world_map_finds_all_light(fields):
     lights = build(image_sky(**fields))
-    n = 1500
+    n = 1536  # a multiple of the image's sides
     s, t = (a.ravel() for a in np.meshgrid((np.arange(n) + 0.5) / n, (np.arange(n) + 0.5) / n, indexing="ij"))
     wi = Equirectangular().point(s, t).astype(np.float32)
     weight = np.maximum(wi[:, 2], 0) * np.sin(np.pi * s) * (2 * np.pi**2 / n**2)

@@ -1,15 +1,11 @@
 // Building the light tree by the surface area orientation heuristic, walking it down to sample and up for densities.
 #include "lights/light_tree.h"
 
-#include <numeric>
+#include <algorithm>
 
 namespace gi {
 
 namespace {
-
-float sin_from(float c) { return safe_sqrt(1.0f - c * c); }
-// cos and sin of max(0, a − b).
-float cos_difference(float cos_a, float cos_b) { return cos_a > cos_b ? 1.0f : cos_a * cos_b + sin_from(cos_a) * sin_from(cos_b); }
 
 struct Cone {
   Vec3 axis;
@@ -32,21 +28,44 @@ Cone merge_cones(Cone a, Cone b) {
   return {normalize(rotate(b.axis, normalize(turn), angle - angle_b)), std::cos(angle)};
 }
 
-// M_Ω: solid angle that the cluster shines into, weighed by the cosine beyond its normals. [Conty & Kulla 2018, eq. 1]
-float orientation_measure(const LightBounds& b) {
-  const float theta_o = std::acos(std::clamp(b.cos_normals, -1.0f, 1.0f));
-  const float theta_w = std::min(theta_o + std::acos(std::clamp(b.cos_emission, -1.0f, 1.0f)), kPi);
-  const float sin_o = std::sin(theta_o);
-  const float m = 2.0f * kPi * (1.0f - b.cos_normals) +
-                  0.5f * kPi * (2.0f * theta_w * sin_o - std::cos(theta_o - 2.0f * theta_w) - 2.0f * theta_o * sin_o + b.cos_normals);
-  return b.two_sided ? 2.0f * m : m;
+// M_Ω: the solid angle into which a cone of normals shines, weighed by the cosine beyond it. [Conty & Kulla 2018, eq. 1]
+float orientation_measure(float cos_o, float cos_e) {
+  const float theta_o = std::acos(std::clamp(cos_o, -1.0f, 1.0f)), sin_o = std::sin(theta_o);
+  const float theta_w = std::min(theta_o + std::acos(std::clamp(cos_e, -1.0f, 1.0f)), kPi);
+  return 2.0f * kPi * (1.0f - cos_o) +
+         0.5f * kPi * (2.0f * theta_w * sin_o - std::cos(theta_o - 2.0f * theta_w) - 2.0f * theta_o * sin_o + cos_o);
 }
 
-float split_cost(const LightBounds& b, float elongation) {
-  if (!(b.power > 0.0f)) return 0.0f;
-  const Vec3 e = b.hi - b.lo;
-  return b.power * orientation_measure(b) * elongation * (2.0f * (e.x * e.y + e.y * e.z + e.z * e.x));
-}
+// What the split heuristic sums up. The cone of normals is judged by the length of their mean, far cheaper than its bound.
+struct Bin {
+  Bounds box;
+  Vec3 normals;
+  float power = 0, cos_emission = 1, cos_normals = 1;
+  bool two_sided = false;
+  uint32_t count = 0;
+
+  void add(const LightBounds& b) {
+    box.add(b.box());
+    // Of a two-sided light either normal is as good.
+    normals += b.two_sided && dot(normals, b.axis) < 0.0f ? -b.axis : b.axis;
+    power += b.power, cos_emission = std::min(cos_emission, b.cos_emission), cos_normals = std::min(cos_normals, b.cos_normals);
+    two_sided = two_sided || b.two_sided, ++count;
+  }
+  void add(const Bin& b) {
+    if (b.count == 0) return;
+    box.add(b.box);
+    normals += b.two_sided && dot(normals, b.normals) < 0.0f ? -b.normals : b.normals;
+    power += b.power, cos_emission = std::min(cos_emission, b.cos_emission), cos_normals = std::min(cos_normals, b.cos_normals);
+    two_sided = two_sided || b.two_sided, count += b.count;
+  }
+  float cost() const {
+    const float mean = std::min(length(normals) / float(count), 1.0f);
+    const float spread = std::min(2.0f * mean - 1.0f, cos_normals);  // normals even over a cone of this cosine have this mean
+    const Vec3 e = box.extent();
+    const float area = 2.0f * (e.x * e.y + e.y * e.z + e.z * e.x);
+    return power * area * orientation_measure(spread, cos_emission) * (two_sided ? 2.0f : 1.0f);
+  }
+};
 
 }  // namespace
 
@@ -67,99 +86,115 @@ LightBounds merge(const LightBounds& a, const LightBounds& b) {
 float light_importance(const LightBounds& b, const LightQuery& query) {
   const Vec3 to = query.position - (b.lo + b.hi) * 0.5f;
   const float d2 = length_squared(to), r2 = 0.25f * length_squared(b.hi - b.lo);
-  const Vec3 w = d2 > 0.0f ? to * (1.0f / std::sqrt(d2)) : Vec3{0, 0, 1};  // from the lights to the point
-  const float cos_bounds = d2 > r2 ? safe_sqrt(1.0f - r2 / d2) : -1.0f;
+  const bool has_normal = length_squared(query.normal) > 0.0f;
+  if (!(d2 > r2)) return b.power / std::max(r2, 1e-12f);  // among the lights every angle is possible
+  const float inverse = 1.0f / std::sqrt(d2), sin_bounds = std::sqrt(r2) * inverse;
+  const float cos_bounds = std::sqrt(std::max(1.0f - sin_bounds * sin_bounds, 0.0f));
+  float importance = b.power * inverse * inverse;
 
-  // The least angle to a normal, over all the cluster's places and normals.
-  float c = dot(w, b.axis);
-  if (b.two_sided) c = std::abs(c);
-  c = std::clamp(c, -1.0f, 1.0f);
-  const float after_normals = cos_difference(c, b.cos_normals);
-  const float least = cos_difference(after_normals, cos_bounds);
-  if (least < b.cos_emission - 1e-4f) return 0.0f;
-  // Emission beyond the cosine's reach (spheres, points) has cos_normals = −1, hence least = 1.
-  float importance = b.power * std::max(least, 0.01f) / std::max(d2, std::max(r2, 1e-12f));
+  // The least angle to a normal, over all the cluster's places and normals: θ − θ_normals − θ_bounds.
+  if (b.cos_normals > -1.0f) {
+    float c = dot(to, b.axis) * inverse;
+    if (b.two_sided) c = std::abs(c);
+    if (c < b.cos_normals) {
+      const float s = safe_sqrt(1.0f - c * c), sin_normals = safe_sqrt(1.0f - b.cos_normals * b.cos_normals);
+      c = c * b.cos_normals + s * sin_normals;
+      if (c < cos_bounds) {
+        c = c * cos_bounds + safe_sqrt(1.0f - c * c) * sin_bounds;
+        if (c < b.cos_emission - 1e-4f) return 0.0f;
+        importance *= std::max(c, 0.01f);
+      }
+    }
+  }
 
   // Receiver. Its lobes may have bumped normals, so nothing is ruled out.
-  if (length_squared(query.normal) > 0.0f) {
-    float cos_i = -dot(w, query.normal);
-    if (query.transmission) cos_i = std::abs(cos_i);
-    importance *= std::max(cos_difference(std::clamp(cos_i, -1.0f, 1.0f), cos_bounds), 0.02f);
+  if (has_normal) {
+    float c = -dot(to, query.normal) * inverse;
+    if (query.transmission) c = std::abs(c);
+    if (c < cos_bounds) importance *= std::max(c * cos_bounds + safe_sqrt(1.0f - c * c) * sin_bounds, 0.02f);
   }
   return importance;
 }
 
-LightTree::LightTree(const std::vector<LightBounds>& lights) : order_(lights.size()), slot_of_(lights.size()), leaf_of_(lights.size()) {
+LightTree::LightTree(const std::vector<LightBounds>& lights) : slot_of_(lights.size()), leaf_of_(lights.size()) {
   if (lights.empty()) return;
-  std::iota(order_.begin(), order_.end(), 0u);
+  std::vector<Item> items;
+  items.reserve(lights.size());
+  for (uint32_t i = 0; i < lights.size(); ++i) items.push_back({lights[i], lights[i].box().center(), i});
   nodes_.reserve(lights.size() / 2 + 2);
   nodes_.emplace_back();
-  build(0, 0, uint32_t(lights.size()), lights);
-  slots_.reserve(lights.size());
-  for (uint32_t light : order_) slots_.push_back(lights[light]);
+  build(items);
+  slots_.reserve(items.size()), order_.reserve(items.size());
+  for (const Item& item : items) slots_.push_back(item.bounds), order_.push_back(item.light);
 }
 
-void LightTree::build(uint32_t root, uint32_t root_begin, uint32_t root_end, const std::vector<LightBounds>& lights) {
+void LightTree::build(std::vector<Item>& items) {
   struct Task {
     uint32_t node, begin, end;
   };
-  std::vector<Task> tasks{{root, root_begin, root_end}};
+  std::vector<Task> tasks{{0, 0, uint32_t(items.size())}};
   while (!tasks.empty()) {
     const auto [node, begin, end] = tasks.back();
     tasks.pop_back();
-    LightBounds bounds;
-    for (uint32_t i = begin; i < end; ++i) bounds = merge(bounds, lights[order_[i]]);
-    nodes_[node].bounds = bounds;
     if (end - begin <= kLeafSize) {
       nodes_[node].first = begin, nodes_[node].count = end - begin;
-      for (uint32_t i = begin; i < end; ++i) slot_of_[order_[i]] = i, leaf_of_[order_[i]] = node;
+      for (uint32_t i = begin; i < end; ++i) {
+        slot_of_[items[i].light] = i, leaf_of_[items[i].light] = node;
+        nodes_[node].bounds = merge(nodes_[node].bounds, items[i].bounds);
+      }
       continue;
     }
-    const uint32_t middle = split(begin, end, bounds, lights), child = uint32_t(nodes_.size());
+    const uint32_t middle = split({items.data() + begin, end - begin}) + begin, child = uint32_t(nodes_.size());
     nodes_[node].first = child;
     nodes_.emplace_back(), nodes_.emplace_back();
     nodes_[child].parent = nodes_[child + 1].parent = node;
     tasks.push_back({child, begin, middle});
     tasks.push_back({child + 1, middle, end});
   }
+  // Children come after their parents.
+  for (size_t i = nodes_.size(); i-- > 0;) {
+    Node& n = nodes_[i];
+    if (n.count == 0) n.bounds = merge(nodes_[n.first].bounds, nodes_[n.first + 1].bounds);
+  }
 }
 
-uint32_t LightTree::split(uint32_t begin, uint32_t end, const LightBounds& bounds, const std::vector<LightBounds>& lights) {
+uint32_t LightTree::split(std::span<Item> items) {
   constexpr int kBins = 12;
-  Bounds centers;
-  for (uint32_t i = begin; i < end; ++i) centers.add(lights[order_[i]].box().center());
-  const Vec3 extent = centers.extent(), box = bounds.hi - bounds.lo;
-  const float longest = std::max({box.x, box.y, box.z});
+  Bounds centers, box;
+  for (const Item& item : items) centers.add(item.center), box.add(item.bounds.box());
+  const Vec3 extent = centers.extent(), size = box.extent();
+  const Vec3 scale{extent.x > 0 ? kBins / extent.x : 0.0f, extent.y > 0 ? kBins / extent.y : 0.0f, extent.z > 0 ? kBins / extent.z : 0.0f};
+  const auto bin_of = [&](const Item& item, int axis) {
+    return std::clamp(int((item.center[axis] - centers.lo[axis]) * scale[axis]), 0, kBins - 1);
+  };
+  Bin bins[3][kBins];
+  for (const Item& item : items) {
+    for (int axis = 0; axis < 3; ++axis) bins[axis][bin_of(item, axis)].add(item.bounds);
+  }
+
+  const float longest = std::max({size.x, size.y, size.z});
   float best = kInf;
   int best_axis = -1, best_bin = 0;
-  const auto bin_of = [&](uint32_t light, int axis) {
-    const float x = (lights[light].box().center()[axis] - centers.lo[axis]) / extent[axis];
-    return std::clamp(int(x * kBins), 0, kBins - 1);
-  };
   for (int axis = 0; axis < 3; ++axis) {
     if (!(extent[axis] > 0.0f)) continue;
-    LightBounds bins[kBins];
-    for (uint32_t i = begin; i < end; ++i) {
-      LightBounds& bin = bins[bin_of(order_[i], axis)];
-      bin = merge(bin, lights[order_[i]]);
-    }
-    LightBounds above[kBins];
-    for (int b = kBins - 1; b > 0; --b) above[b - 1] = merge(b < kBins - 1 ? above[b] : LightBounds{}, bins[b]);
-    LightBounds below;
-    const float elongation = longest / std::max(box[axis], 1e-20f);
+    const float elongation = longest / std::max(size[axis], 1e-20f);
+    float above[kBins];
+    Bin sum;
+    for (int b = kBins - 1; b > 0; --b) sum.add(bins[axis][b]), above[b - 1] = sum.count ? sum.cost() : -1.0f;
+    sum = {};
     for (int b = 0; b < kBins - 1; ++b) {
-      below = merge(below, bins[b]);
-      if (!(below.power > 0.0f) || !(above[b].power > 0.0f)) continue;
-      const float cost = split_cost(below, elongation) + split_cost(above[b], elongation);
+      sum.add(bins[axis][b]);
+      if (sum.count == 0 || above[b] < 0.0f) continue;
+      const float cost = elongation * (sum.cost() + above[b]);
       if (cost < best) best = cost, best_axis = axis, best_bin = b;
     }
   }
-  const auto first = order_.begin() + begin, last = order_.begin() + end;
-  auto middle = first;
-  if (best_axis >= 0) middle = std::partition(first, last, [&](uint32_t light) { return bin_of(light, best_axis) <= best_bin; });
+  auto middle = items.begin();
+  if (best_axis >= 0)
+    middle = std::partition(items.begin(), items.end(), [&](const Item& item) { return bin_of(item, best_axis) <= best_bin; });
   // All in one place (or numbers too wild for the heuristic): halves.
-  if (middle == first || middle == last) middle = first + (last - first) / 2;
-  return uint32_t(middle - order_.begin());
+  if (middle == items.begin() || middle == items.end()) middle = items.begin() + std::ptrdiff_t(items.size() / 2);
+  return uint32_t(middle - items.begin());
 }
 
 std::optional<LightTree::Pick> LightTree::sample(const LightQuery& query, float u) const {

@@ -42,14 +42,19 @@ class LightTree {
 
  private:
   static constexpr uint32_t kLeafSize = 8;
-  struct Node {
+  struct alignas(64) Node {
     LightBounds bounds;
     uint32_t first = 0;  // of the two children, or of the leaf's lights
     uint32_t count = 0;  // lights in the leaf; 0: inner node
     uint32_t parent = 0;
   };
-  void build(uint32_t node, uint32_t begin, uint32_t end, const std::vector<LightBounds>& lights);
-  uint32_t split(uint32_t begin, uint32_t end, const LightBounds& bounds, const std::vector<LightBounds>& lights);
+  struct Item {
+    LightBounds bounds;
+    Vec3 center;
+    uint32_t light;
+  };
+  void build(std::vector<Item>& items);
+  static uint32_t split(std::span<Item> items);  // puts them in order; how many go left
 
   std::vector<Node> nodes_;           // siblings are neighbours
   std::vector<LightBounds> slots_;    // lights in the order of the leaves

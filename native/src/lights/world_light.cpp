@@ -2,13 +2,14 @@
 #include "lights/world_light.h"
 
 #include "core/parallel.h"
+#include "shading/images.h"
 
 namespace gi {
 
 namespace {
 
 constexpr int kProbeWidth = 64;         // is there anything, and does it vary?
-constexpr int kAutomaticWidth = 1024;
+constexpr int kLeastWidth = 512, kMostWidth = 2048;  // of the automatic map
 constexpr float kFloor = 0.02f;         // of the mean, everywhere: what lies between the map's samples is not ruled out
 
 float strength(const Scene& scene, float x, float y) {
@@ -36,6 +37,15 @@ std::vector<float> radiance_map(const Scene& scene, int width, int subsamples, T
     }
   });
   return map;
+}
+
+// Fine enough for the sun in a panorama, if the scene has one; half its width, as each texel is sampled twice across.
+int automatic_width(const Scene& scene) {
+  int width = kLeastWidth;
+  const ImageSet* images = scene.resources().images.get();
+  for (size_t i = 0; images && i < images->size(); ++i)
+    width = std::max(width, (*images)[i].tiles.empty() ? 0 : (*images)[i].tiles[0].width / 2);
+  return std::min(width, kMostWidth);
 }
 
 float mean_over_sphere(const std::vector<float>& map, int width) {
@@ -66,8 +76,8 @@ WorldLight::WorldLight(const Scene& scene, int threads) {
   std::vector<float> map = radiance_map(scene, width, 2, pool);
   const auto [least, most] = std::minmax_element(map.begin(), map.end());
   if (world.map_resolution > 0 || *least != *most || *most == 0.0f) {
-    width = std::clamp(world.map_resolution > 0 ? world.map_resolution : kAutomaticWidth, 4, 8192) & ~1;
-    map = radiance_map(scene, width, world.map_resolution > 0 ? 1 : 2, pool);
+    width = std::clamp(world.map_resolution > 0 ? world.map_resolution : automatic_width(scene), 4, 8192) & ~1;
+    map = radiance_map(scene, width, 2, pool);
   } else {
     mean_ = *most;
     return;  // depends on the point in name only
@@ -84,8 +94,9 @@ WorldLight::WorldLight(const Scene& scene, int threads) {
       const auto at = [&](int dx, int dy) {
         return map[size_t(std::clamp(y + dy, 0, height - 1)) * size_t(width) + size_t((x + dx + width) % width)];
       };
-      const float around = 0.25f * (at(-1, 0) + at(1, 0) + at(0, -1) + at(0, 1));
-      density[size_t(y) * size_t(width) + size_t(x)] = s * (0.75f * at(0, 0) + 0.25f * around + kFloor * mean_);
+      const float sides = at(-1, 0) + at(1, 0) + at(0, -1) + at(0, 1), corners = at(-1, -1) + at(-1, 1) + at(1, -1) + at(1, 1);
+      const float blurred = (8.0f * at(0, 0) + 1.5f * sides + 0.5f * corners) * (1.0f / 16.0f);
+      density[size_t(y) * size_t(width) + size_t(x)] = s * (blurred + kFloor * mean_);
     }
   }
   map_ = Distribution2D(density, width, height);
