@@ -83,7 +83,7 @@ struct TriangleLight {
     return on_triangle(position, wi, 1.0f / k.solid_angle);
   }
 
-  // Barycentrics of the direction, clamped into the triangle, after Möller and Trumbore.
+  // Barycentrics of the direction, clamped into the triangle. [Möller & Trumbore 1997]
   std::optional<TriangleSample> on_triangle(Vec3 position, Vec3 wi, float pdf) const {
     const Vec3 p = cross(wi, ac);
     const float det = dot(ab, p);

@@ -59,7 +59,7 @@ float side_radiance(const Scene& scene, Candidate c, Vec3 wo, int points, bool& 
   PathState path;
   path.kind = 0, path.depth = 1;
   for (int k = 0; k < points; ++k) {
-    // The additive recurrence of the plastic number: even in two dimensions.
+    // R2 sequence. [Roberts 2018]
     const float x = 0.5f + 0.75487766f * float(k), y = 0.5f + 0.56984029f * float(k);
     const Vec2 b = sample_triangle({x - std::floor(x), y - std::floor(y)});
     ShadingPoint p = scene.surface_point(c.instance, c.triangle, b.x, b.y, wo, path);
