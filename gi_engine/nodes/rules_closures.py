@@ -9,7 +9,6 @@ from __future__ import annotations
 from .program import COLOR, Value
 from .rules import closure_rule
 from .rules_input import radial_tangent
-from .rules_input import radial_tangent
 
 NONE = (0.0, 0.0, 0.0)  # a normal or tangent that is not linked
 CUTOFF = 1e-5  # weights below this do not show, as in Cycles
@@ -163,13 +162,13 @@ def principled(b, weight):
         b.op("alpha", weight, alpha)
     base_normal, top = normal(b), principled_top(b)
     principled_emission(b, weight, alpha, base_normal, top)
-    subsurface = b.input("Subsurface Weight")
-    if not is_zero(b, subsurface):
+    subsurface, thin_wall = b.input("Subsurface Weight"), b.input("Thin Wall", default=0.0)
+    if not is_zero(b, subsurface) and number(b, thin_wall) in (None, 0.0):
         b.warn("subsurface scattering is not rendered yet; it is diffuse of the same albedo")
     anisotropy = b.input("Anisotropic")
     b.op(
         "principled", weight, alpha, base_normal, *top,
-        b.input("Base Color"), b.input("Metallic"), b.input("Roughness"), b.input("IOR"), b.input("Thin Wall", default=0.0),
+        b.input("Base Color"), b.input("Metallic"), b.input("Roughness"), b.input("IOR"), thin_wall,
         b.input("Diffuse Roughness"), subsurface, b.input("Subsurface Anisotropy"),
         b.input("Specular IOR Level"), b.input("Specular Tint"),
         anisotropy, b.input("Anisotropic Rotation"), tangent(b, anisotropy),
