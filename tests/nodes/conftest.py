@@ -94,14 +94,22 @@ class Stage:
         self.exported, self.warnings = result.scene, list(result.warnings)
         return native.build_scene(self.exported, threads=1).emission_seen(self.exported.camera, SIZE, SIZE)
 
-    def check(self, tolerance=2e-4, outliers=0.01) -> np.ndarray:
-        """Both engines see the same, but for the pixels where jumps of the value fall between the two rays."""
+    def check(self, tolerance=2e-4, outliers=0.02) -> np.ndarray:
+        """Both engines see the same, up to what the value changes over 2 % of a pixel (Cycles jitters its ray by 1 %), but for
+        the few pixels where a jump of the value falls between the two rays."""
         cycles, ours = self.cycles(), self.ours()
-        error = np.abs(ours - cycles).max(-1) / np.maximum(1.0, np.abs(cycles).max(-1))
         assert np.isfinite(ours).all()
-        wrong = (error > tolerance).mean()
-        assert wrong <= outliers, f"{wrong:.1%} of the pixels differ, by up to {error.max():.3g}"
+        size = np.maximum(1.0, np.abs(cycles))
+        wrong = (np.abs(ours - cycles) > tolerance * size + 0.02 * change_over_pixel(cycles)).any(-1)
+        assert wrong.mean() <= outliers, f"{wrong.mean():.1%} of the pixels differ, by up to {np.abs(ours - cycles).max():.3g}"
         return ours
+
+
+def change_over_pixel(image: np.ndarray) -> np.ndarray:
+    """The largest difference to a neighbour."""
+    padded = np.pad(image, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    near = [padded[1 + dy : 1 + dy + SIZE, 1 + dx : 1 + dx + SIZE] for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
+    return np.abs(np.stack(near) - image).max(0)
 
 
 def node_tree(owner):

@@ -67,7 +67,10 @@ struct Camera {
       }
       r.spread = 0.5f * std::abs(latitude[1] - latitude[0]) * pixel.y;
     }
-    r.ray = {to_world.point(origin), normalize(to_world.vector(direction)), start, end};
+    // The ray starts at the near clip plane: Blender's Ray Length counts from there.
+    const Vec3 towards = normalize(to_world.vector(direction));
+    r.ray = {to_world.point(origin) + towards * start, towards, 0.0f, end - start};
+    r.footprint += r.spread * start;
     return r;
   }
 

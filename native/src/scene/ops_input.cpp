@@ -24,7 +24,7 @@ void generated(const Operands& o, ShadeState& s) { o.set(0, generated_coordinate
 
 void reflection(const Operands& o, ShadeState& s) {
   const ShadingPoint& p = s.point;
-  o.set(0, p.instance == kNoId ? p.wo : -reflect(p.wo, p.ns));
+  o.set(0, p.instance == kNoId ? p.wo : reflect(p.wo, p.ns));
 }
 
 // size; in pixels
