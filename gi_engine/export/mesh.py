@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..nodes.attributes import ACTIVE_COLOR, UNDEFORMED
 from ..scene_data import Attribute, Mesh
 from .arrays import read, read_attribute, triangle_corners
 
-UNDEFORMED = ".undeformed"  # the attribute that holds positions before deformation, for Generated coordinates
 
 
 def export_mesh(mesh, name: str, wanted: set[str]) -> Mesh | None:
@@ -68,5 +68,9 @@ def read_attributes(mesh, wanted: set[str], active_uv: str):
         data = read_attribute(attribute)
         if data is not None:
             yield Attribute(attribute.name, attribute.domain, data)
+    colors = mesh.color_attributes
+    if ACTIVE_COLOR in wanted and 0 <= colors.render_color_index < len(colors):
+        color = colors[colors.render_color_index]
+        yield Attribute(ACTIVE_COLOR, color.domain, read_attribute(color))
     if UNDEFORMED in wanted:
         yield Attribute(UNDEFORMED, "POINT", read(mesh.vertices, "undeformed_co", 3, np.float32))

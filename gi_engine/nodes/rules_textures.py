@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from .attributes import UNDEFORMED
 from .program import COLOR, VECTOR
 from .rules import rule
 from .sky import sky_texture
 
-UNDEFORMED = ".undeformed"  # as export.mesh names it
 DIMENSIONS = {"1D": 1, "2D": 2, "3D": 3, "4D": 4}
 FRACTALS = {"MULTIFRACTAL": 0, "FBM": 1, "HYBRID_MULTIFRACTAL": 2, "RIDGED_MULTIFRACTAL": 3, "HETERO_TERRAIN": 4}
 GRADIENTS = {

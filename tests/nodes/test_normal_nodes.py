@@ -1,0 +1,160 @@
+"""Nodes that change normals, tangents and attributes, against Cycles."""
+
+import bpy
+import pytest
+
+
+def waves(stage, scale=9.0):
+    """A smooth height that varies over the surface."""
+    coordinates, apart = stage.new("ShaderNodeTexCoord"), stage.new("ShaderNodeSeparateXYZ")
+    stage.link(coordinates.outputs["Object"], apart.inputs[0])
+    product = stage.new("ShaderNodeMath", operation="MULTIPLY")
+    for i in range(2):
+        times, sine = stage.new("ShaderNodeMath", operation="MULTIPLY"), stage.new("ShaderNodeMath", operation="SINE")
+        times.inputs[1].default_value = scale
+        stage.link(apart.outputs[i], times.inputs[0])
+        stage.link(times.outputs[0], sine.inputs[0])
+        stage.link(sine.outputs[0], product.inputs[i])
+    return product.outputs[0]
+
+
+@pytest.mark.parametrize("invert", [False, True])
+@pytest.mark.parametrize("strength", [1.0, 0.4])
+def test_bump(stage, invert, strength):
+    node = stage.new("ShaderNodeBump", invert=invert)
+    node.inputs["Strength"].default_value, node.inputs["Distance"].default_value = strength, 0.05
+    stage.link(waves(stage), node.inputs["Height"])
+    stage.show(node.outputs[0])
+    # One-sided differences over steps of the surface that the engines take in different directions.
+    stage.check(tolerance=2e-2)
+
+
+def test_bump_of_attribute_and_bump(stage):
+    """Heights from UV maps move with the barycentrics; a bump on a bump."""
+    first, second = stage.new("ShaderNodeBump"), stage.new("ShaderNodeBump")
+    for node in (first, second):
+        node.inputs["Distance"].default_value = 0.2
+    apart = stage.new("ShaderNodeSeparateXYZ")
+    stage.link(stage.new("ShaderNodeUVMap", uv_map="Second").outputs[0], apart.inputs[0])
+    stage.link(apart.outputs["Y"], first.inputs["Height"])
+    stage.link(waves(stage, 4.0), second.inputs["Height"])
+    stage.link(first.outputs[0], second.inputs["Normal"])
+    stage.show(second.outputs[0])
+    stage.check(tolerance=2e-2)
+
+
+def test_bump_without_height(stage):
+    stage.show(stage.new("ShaderNodeBump").outputs[0])
+    stage.check()
+
+
+@pytest.mark.parametrize("space", ["OBJECT", "WORLD"])
+def test_displacement_as_bump(stage, space):
+    node = stage.new("ShaderNodeDisplacement", space=space)
+    node.inputs["Scale"].default_value = 0.05
+    stage.link(waves(stage, 4.0), node.inputs["Height"])
+    output = next(n for n in stage.tree.nodes if n.type == "OUTPUT_MATERIAL")
+    stage.link(node.outputs[0], output.inputs["Displacement"])
+    stage.material.displacement_method = "BUMP"
+    stage.show(stage.new("ShaderNodeNewGeometry").outputs["Normal"])
+    stage.check(tolerance=2e-2)
+    assert not stage.warnings
+
+
+def color(stage):
+    node = stage.new("ShaderNodeVectorMath", operation="MULTIPLY_ADD")
+    stage.link(stage.new("ShaderNodeTexCoord").outputs["UV"], node.inputs[0])
+    node.inputs[1].default_value, node.inputs[2].default_value = (0.3, 0.2, 0.0), (0.4, 0.4, 0.9)
+    return node.outputs[0]
+
+
+@pytest.mark.parametrize("strength", [1.0, 0.5, 1.7])
+@pytest.mark.parametrize("space", ["TANGENT", "OBJECT", "WORLD", "BLENDER_OBJECT", "BLENDER_WORLD"])
+def test_normal_map(stage, space, strength):
+    node = stage.new("ShaderNodeNormalMap", space=space)
+    node.inputs["Strength"].default_value = strength
+    stage.link(color(stage), node.inputs["Color"])
+    stage.show(node.outputs[0])
+    # Cycles interpolates tangents of vertices, this engine takes each triangle's own.
+    stage.check(tolerance=5e-2 if space == "TANGENT" else 2e-4)
+
+
+def test_normal_map_names_its_uv_map(stage):
+    node = stage.new("ShaderNodeNormalMap", uv_map="Second")
+    stage.link(color(stage), node.inputs["Color"])
+    stage.show(node.outputs[0])
+    stage.check(tolerance=5e-2)
+
+
+@pytest.mark.parametrize(("direction", "axis"), [("RADIAL", "X"), ("RADIAL", "Y"), ("RADIAL", "Z"), ("UV_MAP", "Z")])
+def test_tangent(stage, direction, axis):
+    node = stage.new("ShaderNodeTangent", direction_type=direction, axis=axis)
+    stage.show(node.outputs[0])
+    stage.check(tolerance=0.2 if direction == "UV_MAP" else 2e-4)  # Cycles interpolates tangents of vertices here too
+
+
+@pytest.mark.parametrize("output", ["Color", "Vector", "Fac", "Alpha"])
+@pytest.mark.parametrize("name", ["number", "vector", "paint", "First", "missing"])
+def test_attribute(stage, name, output):
+    stage.show(stage.new("ShaderNodeAttribute", attribute_name=name).outputs[output])
+    stage.check()
+
+
+@pytest.mark.parametrize("name", ["custom", "color", "location"])
+@pytest.mark.parametrize("kind", ["OBJECT", "INSTANCER"])
+def test_property_of_object(stage, name, kind):
+    stage.show(stage.new("ShaderNodeAttribute", attribute_type=kind, attribute_name=name).outputs["Color"])
+    stage.check()
+
+
+def test_property_of_view_layer(stage):
+    stage.scene["wind"] = 0.25
+    stage.show(stage.new("ShaderNodeAttribute", attribute_type="VIEW_LAYER", attribute_name="wind").outputs["Fac"])
+    assert stage.check().any()
+
+
+@pytest.mark.parametrize("output", ["Color", "Alpha"])
+@pytest.mark.parametrize("name", ["paint", "", "missing"])
+def test_color_attribute(stage, name, output):
+    stage.show(stage.new("ShaderNodeVertexColor", layer_name=name).outputs[output])
+    stage.check()
+
+
+@pytest.mark.parametrize("name", ["First", "Second", ""])
+def test_uv_map(stage, name):
+    stage.show(stage.new("ShaderNodeUVMap", uv_map=name).outputs[0])
+    stage.check()
+
+
+@pytest.mark.parametrize("pixels", [False, True])
+def test_wireframe(stage, pixels):
+    node = stage.new("ShaderNodeWireframe", use_pixel_size=pixels)
+    node.inputs[0].default_value = 0.8 if pixels else 0.05
+    stage.show(node.outputs[0])
+    stage.check(outliers=0.08 if pixels else 0.02)
+
+
+def test_coordinates_of_another_object(stage):
+    empty = bpy.data.objects.new("Empty", None)
+    empty.location, empty.rotation_euler, empty.scale = (1, 2, 3), (0.3, 0.2, 0.9), (2, 1, 0.5)
+    stage.scene.collection.objects.link(empty)
+    stage.show(stage.new("ShaderNodeTexCoord", object=empty).outputs["Object"])
+    stage.check()
+
+
+def test_generated_of_deformed_mesh(stage):
+    """Generated stays with the mesh as it was before modifiers moved it."""
+    modifier = stage.object.modifiers.new("Bend", "SIMPLE_DEFORM")
+    modifier.deform_method, modifier.angle = "BEND", 1.0
+    stage.show(stage.new("ShaderNodeTexCoord").outputs["Generated"])
+    stage.check()
+
+
+@pytest.mark.parametrize("output", ["Generated", "Normal", "Object", "Camera", "Window", "Reflection"])
+def test_world(stage, output):
+    world = stage.scene.world = bpy.data.worlds.new("World")
+    world.use_nodes = True
+    nodes = world.node_tree.nodes
+    world.node_tree.links.new(nodes.new("ShaderNodeTexCoord").outputs[output], nodes["Background"].inputs["Color"])
+    stage.scene.collection.objects.unlink(stage.object)
+    stage.check()
