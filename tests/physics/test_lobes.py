@@ -300,6 +300,19 @@ def test_mixes_follow_the_density(cos_o):
     assert np.quantile(np.abs(e / s[:, 3:7] - 1), 0.999) < 5e-3
 
 
+def test_lobes_with_a_poor_estimate_of_albedo_are_sampled_too():
+    """Past the critical angle a smooth surface lets nothing through, but a rough one does."""
+    rough = ("ggx_refraction", {"alpha": [0.5], "ior": [1 / 1.5]})
+    wo = view(0.3)
+    assert not _core.lobe_albedo(*rough, wo).any()
+    s = mix([("lambert", {}, [0.2] * 3, [0, 0, 1]), (*rough, [1.0] * 3, [0, 0, 1])]).sample(
+        wo[0].tolist(), numbers(200_000)
+    )
+    through = s[(s[:, 6] > 0) & (s[:, 2] < 0)]
+    alone = draw(*rough, wo)[1].mean()
+    assert (through[:, 3] / through[:, 6]).sum() / len(s) == pytest.approx(alone, rel=0.1)
+
+
 def test_delta_lobes_and_transparency_are_picked_by_their_share():
     lobes = [("lambert", {}, [0.2] * 3, [0, 0, 1]), ("ggx_reflection", {"alpha": [0.0]}, [0.5] * 3, [0, 0, 1])]
     bsdf, wo = mix(lobes, transparency=[0.3] * 3), view(0.7)[0].tolist()

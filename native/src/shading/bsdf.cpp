@@ -11,6 +11,8 @@ namespace gi {
 namespace {
 
 constexpr float kLeastWeight = 1e-5f;  // Blender's own cut-off
+// Albedos are estimates, which may be 0 where the lobe is not (rough refraction past the critical angle): all keep a chance.
+constexpr float kLeastShare = 0.02f;
 constexpr uint8_t kKinds = kDiffuse | kGlossy | kSpecular;
 
 uint8_t flags_of(const Lobe& lobe) {
@@ -59,7 +61,7 @@ void Bsdf::finish(Vec3 wo) {
   select_transparent_ = sum;
   for (int i = 0; i < count_; ++i) {
     Entry& e = entries_[i];
-    e.select = single ? 1.0f : average(e.weight * albedo_of(e.lobe, e.frame.to_local(wo)));
+    e.select = single ? 1.0f : std::max(kLeastShare * average(e.weight), average(e.weight * albedo_of(e.lobe, e.frame.to_local(wo))));
     sum += e.select;
   }
   if (select_transparent_ > 0.0f) flags_ |= kTransparent;
