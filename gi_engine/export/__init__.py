@@ -90,7 +90,7 @@ def export_objects(out: Scene, found: Collected, shaders: Shaders, warnings: War
 
 
 def add_mesh(out: Scene, prototype, wanted: set[str], warnings: Warnings) -> int | None:
-    mesh = export_mesh(prototype.mesh, prototype.name, wanted)
+    mesh = export_mesh(prototype.mesh, prototype.name, wanted, prototype.is_deformed)
     if mesh is None:
         # Instancers and curves without a fill have no faces on purpose.
         if prototype.is_plain:

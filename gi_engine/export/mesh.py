@@ -13,10 +13,10 @@ from .arrays import read, read_attribute, triangle_corners
 
 
 
-def export_mesh(mesh, name: str, wanted: set[str]) -> Mesh | None:
+def export_mesh(mesh, name: str, wanted: set[str], deformed: bool = False) -> Mesh | None:
     """Reads an evaluated bpy Mesh; None if it has no triangles.
 
-    `wanted` names the attributes to take along ("" is the UV map that renders by default).
+    `wanted` names the attributes to take along, as nodes/attributes.py has them. `deformed`: vertices may have moved.
     """
     if not mesh.polygons:
         return None
@@ -25,6 +25,8 @@ def export_mesh(mesh, name: str, wanted: set[str]) -> Mesh | None:
         return None
     domain, normals = read_normals(mesh)
     material = mesh.attributes.get("material_index")  # absent where all are 0
+    if not deformed:
+        wanted = wanted - {UNDEFORMED}  # slow to read, and no different from the positions
     active_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
     return Mesh(
         name=name,
@@ -62,15 +64,18 @@ def read_normals(mesh) -> tuple[str, np.ndarray | None]:
 
 def read_attributes(mesh, wanted: set[str], active_uv: str):
     for attribute in mesh.attributes:
-        needed = attribute.name in wanted or ("" in wanted and attribute.name == active_uv)
-        if not needed or attribute.domain not in {"POINT", "CORNER", "FACE"}:
-            continue
-        data = read_attribute(attribute)
-        if data is not None:
-            yield Attribute(attribute.name, attribute.domain, data)
+        if attribute.name in wanted or ("" in wanted and attribute.name == active_uv):
+            yield from read_one(attribute, attribute.name)
     colors = mesh.color_attributes
     if ACTIVE_COLOR in wanted and 0 <= colors.render_color_index < len(colors):
-        color = colors[colors.render_color_index]
-        yield Attribute(ACTIVE_COLOR, color.domain, read_attribute(color))
+        yield from read_one(colors[colors.render_color_index], ACTIVE_COLOR)
     if UNDEFORMED in wanted:
-        yield Attribute(UNDEFORMED, "POINT", read(mesh.vertices, "undeformed_co", 3, np.float32))
+        positions = read(mesh.vertices, "undeformed_co", 3, np.float32)
+        yield Attribute(UNDEFORMED, "POINT", positions)
+
+
+def read_one(attribute, name: str):
+    """Nothing for what shaders cannot use: other types, and values on edges."""
+    data = read_attribute(attribute) if attribute.domain in {"POINT", "CORNER", "FACE"} else None
+    if data is not None:
+        yield Attribute(name, attribute.domain, data)

@@ -53,6 +53,7 @@ class Prototype:
     object: object  # bpy Object that object attributes are read from
     parent: object  # bpy Object that instancer attributes are read from; the same where there is none
     is_plain: bool  # a mesh object of its own, with nothing that may take its faces away on purpose
+    is_deformed: bool  # modifiers or shape keys may have moved its vertices
     matrices: list = field(default_factory=list)  # 16 floats an instance
     randoms: list[int] = field(default_factory=list)  # Blender's number for each; empty where it is not an instance
 
@@ -135,6 +136,7 @@ class Walk:
             object=lasting,
             parent=parent,
             is_plain=lasting == parent and item.type == lasting.type and not lasting.modifiers,
+            is_deformed=bool(lasting.modifiers) or has_shape_keys(lasting),
         )
         self.found.prototypes.append(prototype)
         return prototype
@@ -151,6 +153,10 @@ class Walk:
 
 def ray_visibility(item) -> int:
     return sum(bit for name, bit in VISIBILITY.items() if getattr(item, name)) & VISIBLE_TO_ALL
+
+
+def has_shape_keys(item) -> bool:
+    return getattr(item.original.data, "shape_keys", None) is not None
 
 
 def matrix_of(instance):

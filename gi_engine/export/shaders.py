@@ -5,6 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ..nodes.attributes import look_up, property_paths
+from ..nodes.attributes import look_up, property_paths
+from ..nodes.compile import Compiler
 from ..scene_data import Scene
 from .warnings import Warnings
 
@@ -13,8 +15,6 @@ class Shaders:
     """Hands out indices into scene.programs."""
 
     def __init__(self, scene: Scene, depsgraph, warnings: Warnings):
-        from ..nodes.compile import Compiler
-
         self.scene = scene
         self.compiler = Compiler(scene, depsgraph, warnings.add)
         self.index_of: dict[int, int] = {}
@@ -41,16 +41,18 @@ class Shaders:
         return self.index_of[key]
 
     def wanted_attributes(self) -> set[str]:
+        """Names of what programs read of meshes, and of objects (nodes/attributes.py)."""
         return set(self.scene.attribute_names)
 
     def object_attributes(self, prototype) -> dict[str, tuple]:
-        """Properties of an object, its data and what instances it that programs ask for."""
-        item, parent = prototype.object, prototype.parent
+        """What programs read of an object or its instancer, as far as they have it."""
+        own = (prototype.object, prototype.mesh)
+        owners = {"OBJECT": own, "INSTANCER": (prototype.parent, *own)}
         values = {}
-        for kind, owners in {"OBJECT": (item, item.data), "INSTANCER": (parent, item, item.data)}.items():
+        for kind, candidates in owners.items():
             for name, path in property_paths(self.scene.attribute_names, kind).items():
-                value = look_up(owners, path)
-                if value is not None:
+                value = look_up(candidates, path)
+                if value:
                     values[name] = value
         return values
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from gi_engine.nodes.attributes import UNDEFORMED
 from gi_engine.scene_data import CAMERA, DIFFUSE, SHADOW, VISIBLE_TO_ALL
 
 from .conftest import add, grid, mesh, named, places
@@ -252,6 +253,66 @@ def test_a_long_list_of_names_is_cut(scene, render_export):
         add(scene, f"Hollow {i:02}", mesh(faces=[]))
     (message,) = render_export().warnings
     assert '"Hollow 04" and 7 more' in message
+
+
+def reading(*names: str):
+    """A material whose colour is read from attributes: "OBJECT color", "GEOMETRY uv", …"""
+    found = material("reader")
+    tree = found.node_tree
+    for i, entry in enumerate(names):
+        kind, _, name = entry.partition(" ")
+        node = tree.nodes.new("ShaderNodeAttribute")
+        node.attribute_type, node.attribute_name = kind, name
+        tree.links.new(node.outputs["Fac"], tree.nodes["Principled BSDF"].inputs[("Roughness", "Metallic", "IOR")[i]])
+    return found
+
+
+def test_object_and_instancer_attributes(scene, render_export):
+    data = mesh()
+    data.materials.append(reading("OBJECT weight", "INSTANCER weight", "OBJECT color"))
+    data["weight"] = 1.5
+    leaf = add(scene, "Leaf", data, color=(0.1, 0.2, 0.3, 0.4))
+    carrier = add(scene, "Carrier", grid(1), instance_type="VERTS", show_instancer_for_render=False)
+    carrier["weight"] = (7, 8)
+    leaf.parent = carrier
+    (leaves,) = render_export().scene.instances
+    values = list(leaves.attributes.values())
+    assert values[0] == pytest.approx((1.5, 1.5, 1.5, 1))
+    assert values[1] == pytest.approx((7, 8, 0, 1))
+    assert values[2] == pytest.approx((0.1, 0.2, 0.3, 0.4))
+
+
+def test_only_attributes_that_materials_read_are_taken_along(scene, render_export):
+    data = grid(2)
+    data.attributes.new("read", "FLOAT", "POINT")
+    data.attributes.new("ignored", "FLOAT", "POINT")
+    data.materials.append(reading("GEOMETRY read", "GEOMETRY missing"))
+    add(scene, "Grid", data)
+    assert [a.name for a in render_export().scene.meshes[0].attributes] == ["read"]
+
+
+@pytest.mark.parametrize("by", ["modifier", "shape key"])
+def test_generated_coordinates_are_those_before_deformation(scene, render_export, by):
+    data = grid(2)
+    paint = material("paint")
+    noise = paint.node_tree.nodes.new("ShaderNodeTexNoise")
+    paint.node_tree.links.new(noise.outputs[0], paint.node_tree.nodes["Principled BSDF"].inputs["Base Color"])
+    data.materials.append(paint)
+    item = add(scene, "Grid", data)
+    before = np.array([v.co[:] for v in data.vertices])
+    if by == "modifier":
+        lift = item.modifiers.new("Lift", "DISPLACE")
+        lift.direction, lift.strength, lift.mid_level = "Z", 5, 0
+    else:
+        item.shape_key_add(name="Basis")
+        lifted = item.shape_key_add(name="Lifted")
+        lifted.value = 1
+        for point in lifted.data:
+            point.co.z += 5
+    exported = render_export().scene.meshes[0]
+    (undeformed,) = [a for a in exported.attributes if a.name == UNDEFORMED]
+    np.testing.assert_allclose(undeformed.data, before, atol=1e-5)
+    np.testing.assert_allclose(exported.positions, before + (0, 0, 5), atol=1e-5)
 
 
 def test_random_is_what_cycles_makes_of_the_name(scene, render_export):
