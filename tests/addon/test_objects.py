@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from gi_engine.nodes.attributes import UNDEFORMED
+from gi_engine.nodes.attributes import UNDEFORMED, attribute_name
 from gi_engine.scene_data import CAMERA, DIFFUSE, SHADOW, VISIBLE_TO_ALL
 
 from .conftest import add, grid, mesh, named, places
@@ -276,10 +276,10 @@ def test_object_and_instancer_attributes(scene, render_export):
     carrier["weight"] = (7, 8)
     leaf.parent = carrier
     (leaves,) = render_export().scene.instances
-    values = list(leaves.attributes.values())
-    assert values[0] == pytest.approx((1.5, 1.5, 1.5, 1))
-    assert values[1] == pytest.approx((7, 8, 0, 1))
-    assert values[2] == pytest.approx((0.1, 0.2, 0.3, 0.4))
+    found = leaves.attributes
+    assert found[attribute_name("OBJECT", "weight")] == pytest.approx((1.5, 1.5, 1.5, 1))
+    assert found[attribute_name("INSTANCER", "weight")] == pytest.approx((7, 8, 0, 1))
+    assert found[attribute_name("OBJECT", "color")] == pytest.approx((0.1, 0.2, 0.3, 0.4))
 
 
 def test_only_attributes_that_materials_read_are_taken_along(scene, render_export):
