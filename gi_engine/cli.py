@@ -366,7 +366,7 @@ def open_scene(arguments, err):
         headless.register_once()
     try:
         if arguments.file is not None:
-            headless.open_file(arguments.file)
+            headless.open_file(arguments.file, factory_settings=not arguments.in_blender)
     except headless.RenderError as error:
         print(f"gi-engine: {error}", file=err)
         return None

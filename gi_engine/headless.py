@@ -16,9 +16,11 @@ class RenderError(RuntimeError):
     """The scene could not be read or rendered; the message names what is wrong."""
 
 
-def open_file(path: Path) -> None:
-    """Opens a .blend in place of whatever is open, with Blender's factory settings and no scripts of the file."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+def open_file(path: Path, factory_settings: bool) -> None:
+    """Opens a .blend in place of whatever is open; no scripts of the file run. Factory settings would disable an
+    installed add-on, so inside Blender the user's stay."""
+    if factory_settings:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
     except RuntimeError as error:
