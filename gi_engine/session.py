@@ -33,6 +33,8 @@ class Session:
 
     def __exit__(self, *_) -> None:
         self.native.cancel()
+        while not self.native.wait(POLL_SECONDS):
+            pass
 
     def wait(self) -> bool:
         """Waits a moment, without the GIL; True when the render is done. Raises RenderFailed."""

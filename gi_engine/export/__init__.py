@@ -43,11 +43,13 @@ def export(depsgraph, descriptors: list[dict], engine=None, size=None, integrato
     out.film = export_film(scene, view_layer, resolve(scene, view_layer), (width, height))
     found = collect(depsgraph, warnings)
     shaders = Shaders(out, depsgraph, warnings)
-    world = getattr(view_layer, "world_override", None) or scene.world
+    world = (getattr(view_layer, "world_override", None) or scene.world) if view_layer.use_sky else None
     out.world = export_world(world, shaders.world(world) if world else -1)
     export_lights(out, found, shaders, warnings)
-    export_objects(out, found, shaders, warnings)
-    note_unsupported(scene, found, warnings)
+    if view_layer.use_solid:
+        export_objects(out, found, shaders, warnings)
+    if scene.render.use_motion_blur:
+        warnings.add("motion blur is not supported yet; rendered without")
     settings = export_settings(scene, view_layer, descriptors, integrator)
     return Exported(out, settings, warnings.messages())
 
@@ -98,10 +100,3 @@ def add_mesh(out: Scene, prototype, wanted: set[str], warnings: Warnings) -> int
         return None
     out.meshes.append(mesh)
     return len(out.meshes) - 1
-
-
-def note_unsupported(scene, found: Collected, warnings: Warnings) -> None:
-    if scene.render.use_motion_blur:
-        warnings.add("motion blur is not supported yet; rendered without")
-    for name in found.linked:
-        warnings.add("light linking is not supported yet; it lights everything", name)

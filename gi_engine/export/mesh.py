@@ -12,7 +12,6 @@ from ..scene_data import Attribute, Mesh
 from .arrays import read, read_attribute, triangle_corners
 
 
-
 def export_mesh(mesh, name: str, wanted: set[str], deformed: bool = False) -> Mesh | None:
     """Reads an evaluated bpy Mesh; None if it has no triangles.
 

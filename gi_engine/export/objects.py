@@ -64,7 +64,6 @@ class Collected:
 
     prototypes: list[Prototype] = field(default_factory=list)
     lights: list[tuple] = field(default_factory=list)  # name, bpy Light, matrix, visibility
-    linked: list[str] = field(default_factory=list)  # objects with light linking
 
 
 def collect(depsgraph, warnings: Warnings) -> Collected:
@@ -93,6 +92,7 @@ class Walk:
             self.visit_mesh(instance, item, data)
         elif issubclass(kind, bpy.types.Light):
             visibility = self.visibility(item, instance.parent if instance.is_instance else item)
+            self.note_linking(item)
             self.found.lights.append((item.name, data, matrix_of(instance), visibility))
         elif item.type in UNSUPPORTED:
             self.warnings.add(f"{UNSUPPORTED[item.type]} are not supported yet; left out", item.name)
@@ -118,9 +118,7 @@ class Walk:
         visibility = self.visibility(item, parent)
         if not visibility:
             return None
-        for modifier in getattr(parent, "particle_systems", ()):
-            if modifier.settings.type == "HAIR" and modifier.settings.render_type == "PATH":
-                self.warnings.add("particle hair is not supported yet; left out", parent.name)
+        self.note_unsupported(item, parent)
         override = self.view_layer.material_override
         slots = [override if override else slot.material for slot in item.material_slots] or [override]
         prototype = Prototype(
@@ -140,6 +138,18 @@ class Walk:
         )
         self.found.prototypes.append(prototype)
         return prototype
+
+    def note_unsupported(self, item, parent) -> None:
+        for system in parent.particle_systems:
+            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
+                self.warnings.add("particle hair is not supported yet; left out", parent.name)
+        if item.is_shadow_catcher or parent.is_shadow_catcher:
+            self.warnings.add("shadow catchers are not supported yet; rendered as an ordinary object", item.name)
+        self.note_linking(item)
+
+    def note_linking(self, item) -> None:
+        if item.light_linking.receiver_collection or item.light_linking.blocker_collection:
+            self.warnings.add("light linking is not supported yet; it lights and shadows everything", item.name)
 
     def visibility(self, item, parent) -> int:
         seen = ray_visibility(item)

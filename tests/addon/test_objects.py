@@ -230,6 +230,31 @@ def test_objects_of_unsupported_kinds_are_named(scene, render_export):
     assert any('"Cloud"' in m and "volume" in m for m in messages)
 
 
+def test_what_objects_ask_for_in_vain_is_named(scene, render_export):
+    add(scene, "Catcher", mesh(), is_shadow_catcher=True)
+    lamp = add(scene, "Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    lamp.light_linking.receiver_collection = bpy.data.collections.new("Receivers")
+    hairy = add(scene, "Hairy", mesh())
+    hairy.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    hairy.particle_systems[0].settings.type = "HAIR"
+    scene.render.use_motion_blur = True
+    messages = render_export().warnings
+    for words in (('"Catcher"', "shadow catcher"), ('"Lamp"', "light linking"), ('"Hairy"', "hair"), ("motion blur",)):
+        assert any(all(word in message for word in words) for message in messages), words
+
+
+def test_view_layers_can_leave_out_surfaces_and_sky(scene, render_export):
+    add(scene, "Square", mesh())
+    add(scene, "Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    scene.world = bpy.data.worlds.new("World")
+    scene.view_layers[0].use_sky = False
+    exported = render_export().scene
+    assert exported.world.program == -1 and len(exported.instances) == 1
+    scene.view_layers[0].use_sky, scene.view_layers[0].use_solid = True, False
+    exported = render_export().scene
+    assert exported.world.program >= 0 and not exported.instances and len(exported.lights) == 1
+
+
 def test_singular_and_not_finite_matrices(scene, render_export):
     add(scene, "Flattened", mesh(), scale=(1, 1, 0))
     add(scene, "Mirrored", mesh(), scale=(-1, 1, 1))
