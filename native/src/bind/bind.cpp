@@ -19,6 +19,7 @@ NB_MODULE(_core, m) {
   gi::bind::bind_shading(m);
   gi::bind::bind_lobes(m);
   gi::bind::bind_images(m);
+  gi::bind::bind_evaluate(m);
   gi::bind::bind_bsdf(m);
   gi::bind::bind_lights(m);
 }

@@ -12,6 +12,7 @@ void bind_render(nanobind::module_& m);
 void bind_shading(nanobind::module_& m);
 void bind_lobes(nanobind::module_& m);
 void bind_images(nanobind::module_& m);
+void bind_evaluate(nanobind::module_& m);
 void bind_bsdf(nanobind::module_& m);
 void bind_lights(nanobind::module_& m);
 
