@@ -148,7 +148,9 @@ class TreeWalker:
             return
         if self.resolve(context, output.inputs["Displacement"]).node is not None:
             if material.displacement_method != "BUMP":
-                self.compiler.warn(f"{self.who}: node '{output.name}' moves the surface; its displacement is rendered as bump alone")
+                self.compiler.warn(
+                    f"{self.who}: node '{output.name}' moves the surface; its displacement is rendered as bump alone"
+                )
             NodeBuilder(self, context, output).bump_displacement()
         self.warn_of_volume(context, output)
         self.closure_input(context, output.inputs["Surface"], self.builder.constant(1.0))
@@ -156,7 +158,9 @@ class TreeWalker:
     def warn_of_volume(self, context: Context, output) -> None:
         socket = output.inputs.get("Volume")
         if socket is not None and self.resolve(context, socket).node is not None:
-            self.compiler.warn(f"{self.who}: volumes are not rendered yet; node '{output.name}' renders without its volume")
+            self.compiler.warn(
+                f"{self.who}: volumes are not rendered yet; node '{output.name}' renders without its volume"
+            )
 
     # ---------------------------------------------------------------- following links
 
@@ -200,7 +204,9 @@ class TreeWalker:
             if link.is_muted or link.is_hidden:
                 continue
             if not link.is_valid:
-                self.compiler.warn(f"{self.who}: the link into '{socket.name}' of node '{socket.node.name}' is part of a cycle or invalid and is left out")
+                self.compiler.warn(
+                    f"{self.who}: the link into '{socket.name}' of node '{socket.node.name}' is part of a cycle or invalid and is left out"
+                )
                 continue
             return link
         return None
@@ -244,7 +250,9 @@ class TreeWalker:
         made = NodeBuilder(self, context, node)
         rule = RULES.get(node.bl_idname)
         if rule is None:
-            self.compiler.warn(f"{self.who}: node '{node.name}' ({node.bl_label}) is not supported; it gives its default")
+            self.compiler.warn(
+                f"{self.who}: node '{node.name}' ({node.bl_label}) is not supported; it gives its default"
+            )
             made.pass_defaults()
         else:
             self.active.append(key)
@@ -388,7 +396,9 @@ class NodeBuilder:
         """Displacement as a change of the shading normal alone, before the surface is compiled."""
         with self.walker.isolated():
             width = self.constant(DISPLACEMENT_FILTER_WIDTH)
-            heights = self.shifted_values(lambda: self.op("vector_dot_product", self.input("Displacement"), self.op("normal")), width)
+            heights = self.shifted_values(
+                lambda: self.op("vector_dot_product", self.input("Displacement"), self.op("normal")), width
+            )
             self.op("set_normal", self.op("bump", *heights, 1.0, 1.0, width, self.op("normal"), imm=(True,)))
 
 

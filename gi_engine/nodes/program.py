@@ -85,7 +85,9 @@ class ProgramBuilder:
         that the op wants. Returns its output, or a tuple of outputs; `kind` says COLOR where a width of 3 means one."""
         code, outputs, widths, immediates = op_table()[name]
         if len(inputs) != len(widths) or len(imm) != immediates:
-            raise TypeError(f"op {name} takes {len(widths)} inputs and {immediates} immediates, not {len(inputs)} and {len(imm)}")
+            raise TypeError(
+                f"op {name} takes {len(widths)} inputs and {immediates} immediates, not {len(inputs)} and {len(imm)}"
+            )
         values = tuple(self.fit(value, width) for value, width in zip(inputs, widths, strict=True))
         imm = tuple(int(i) for i in imm)
         key = (name, tuple((v.source, v.component) for v in values), imm)

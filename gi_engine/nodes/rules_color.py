@@ -15,7 +15,9 @@ def color_ramp(b):
 
 @rule("ShaderNodeRGBCurve")
 def rgb_curves(b):
-    b.output("Color", b.op("curves", b.input("Fac"), b.input("Color"), imm=curve_immediates(b, b.node.mapping, channels=3)))
+    b.output(
+        "Color", b.op("curves", b.input("Fac"), b.input("Color"), imm=curve_immediates(b, b.node.mapping, channels=3))
+    )
 
 
 @rule("ShaderNodeRGBToBW")

@@ -36,7 +36,10 @@ def clamp(b):
 
 @rule("ShaderNodeFloatCurve")
 def float_curve(b):
-    b.output("Value", b.op("float_curve", b.input("Factor"), b.input("Value"), imm=curve_immediates(b, b.node.mapping, channels=1)))
+    b.output(
+        "Value",
+        b.op("float_curve", b.input("Factor"), b.input("Value"), imm=curve_immediates(b, b.node.mapping, channels=1)),
+    )
 
 
 @rule("ShaderNodeMix")
@@ -52,7 +55,10 @@ def mix(b):
         color = b.op(f"blend_{node.blend_type.lower()}", factor, b.input("A_Color"), b.input("B_Color"))
         b.output("Result_Color", b.op("saturate_vector", color) if node.clamp_result else color)
     elif node.data_type == "VECTOR":
-        b.output("Result_Vector", b.op("mix_vector_each" if each else "mix_vector", factor, b.input("A_Vector"), b.input("B_Vector")))
+        b.output(
+            "Result_Vector",
+            b.op("mix_vector_each" if each else "mix_vector", factor, b.input("A_Vector"), b.input("B_Vector")),
+        )
     else:
         b.warn("mixing rotations is not supported; it gives A")
         b.output("Result_Rotation", b.input("A_Rotation"))

@@ -36,8 +36,10 @@ ENVIRONMENTS = {"EQUIRECTANGULAR": 0, "MIRROR_BALL": 1}
 def vector(b, default):
     """The Vector input after the node's own mapping (the sidebar's Texture Mapping of old files)."""
     source = b.input("Vector", VECTOR) if b.linked("Vector") else default(b)
-    rows = mapping_rows(getattr(b.node, "texture_mapping", None))
-    return source if rows is None else b.op("affine", source, *rows)
+    mapping = getattr(b.node, "texture_mapping", None)
+    rows = mapping_rows(mapping)
+    mapped = source if rows is None else b.op("affine", source, *rows)
+    return b.op("vector_normalize", mapped) if mapping and mapping.vector_type == "NORMAL" else mapped
 
 
 def generated(b):

@@ -39,7 +39,10 @@ def combine_xyz(b):
 def mapping(b):
     rows = b.op("euler_rows", b.input("Rotation"))
     location = b.input("Location", default=(0.0, 0.0, 0.0))
-    b.output("Vector", b.op("mapping", b.input("Vector"), *rows, location, b.input("Scale"), imm=(MAPPINGS[b.node.vector_type],)))
+    b.output(
+        "Vector",
+        b.op("mapping", b.input("Vector"), *rows, location, b.input("Scale"), imm=(MAPPINGS[b.node.vector_type],)),
+    )
 
 
 @rule("ShaderNodeVectorRotate")
@@ -61,7 +64,9 @@ def vector_transform(b):
 
 @rule("ShaderNodeVectorCurve")
 def vector_curves(b):
-    b.output("Vector", b.op("curves", b.input("Fac"), b.input("Vector"), imm=curve_immediates(b, b.node.mapping, channels=3)))
+    b.output(
+        "Vector", b.op("curves", b.input("Fac"), b.input("Vector"), imm=curve_immediates(b, b.node.mapping, channels=3))
+    )
 
 
 @rule("ShaderNodeNormal")
@@ -81,7 +86,9 @@ def normal_map(b):
     if space == "TANGENT":
         result = b.op("normal_map_tangent", color, strength, imm=(b.attribute(b.node.uv_map), green))
     else:
-        result = b.op("normal_map_space", color, strength, imm=(space.endswith("OBJECT"), space.startswith("BLENDER"), green))
+        result = b.op(
+            "normal_map_space", color, strength, imm=(space.endswith("OBJECT"), space.startswith("BLENDER"), green)
+        )
     b.output("Normal", result)
 
 

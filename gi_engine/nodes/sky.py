@@ -5,6 +5,7 @@ Hosek and Wilkie's sky is left out (its data set is not ours to copy): Preetham'
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -39,11 +40,17 @@ def scattering(b, direction):
     # "Dust" was renamed "aerosol" in Blender 5.0.
     aerosol = n.aerosol_density if hasattr(n, "aerosol_density") else n.dust_density
     model = (n.sky_type in MULTIPLE, elevation, size, n.altitude, n.air_density, aerosol, n.ozone_density)
-    pixels, bottom, top = native.module().sky(*model)
+    pixels, bottom, top = sky_table(*model)
     image = b.image(("sky", *model), lambda: [Image("sky", pixels, alpha="NONE")])
     horizon = -(math.pi / 2 - math.asin(EARTH_RADIUS / (EARTH_RADIUS + max(n.altitude, 0.0))))
     disc = (*bottom, *top, elevation, rotation, size if n.sun_disc else -1.0, n.sun_intensity, horizon)
     return b.op("sky", direction, imm=(image, b.table(disc)), kind=COLOR)
+
+
+@functools.lru_cache(maxsize=4)
+def sky_table(*model):
+    """Kept from export to export: a table takes some tenths of a second."""
+    return native.module().sky(*model)
 
 
 def sun_position(elevation: float, rotation: float) -> tuple[float, float]:
@@ -75,7 +82,8 @@ LUMINANCE_SCALE = 0.06  # Blender's: kcd/m2 to scene-linear
 
 def preetham(sun: tuple, turbidity: float) -> np.ndarray:
     """The floats of the native PreethamSky for a sun in direction `sun`."""
-    theta = math.acos(max(-1.0, min(1.0, sun[2])))
+    sun = np.array(sun) / (np.linalg.norm(sun) or 1.0)
+    theta = math.acos(sun[2])
     chi = (4.0 / 9.0 - turbidity / 120.0) * (math.pi - 2.0 * theta)
     luminance = ((4.0453 * turbidity - 4.9710) * math.tan(chi) - 0.2155 * turbidity + 2.4192) * LUMINANCE_SCALE
     powers = np.array([theta**3, theta**2, theta, 1.0])

@@ -131,12 +131,18 @@ def add_surface(scene):
     mesh.shade_smooth()
     corner = quads.reshape(-1)
     for name, scale in (("First", 1.0), ("Second", 2.0)):
-        uv = np.stack([x.ravel()[corner] * 0.5 + 0.5, scale * y.ravel()[corner] + 0.1 * x.ravel()[corner]], -1).astype(np.float32)
+        uv = np.stack([x.ravel()[corner] * 0.5 + 0.5, scale * y.ravel()[corner] + 0.1 * x.ravel()[corner]], -1).astype(
+            np.float32
+        )
         mesh.uv_layers.new(name=name).data.foreach_set("uv", uv.ravel())
     rng = np.random.default_rng(1)
     mesh.attributes.new("number", "FLOAT", "POINT").data.foreach_set("value", rng.random(n * n).astype(np.float32))
-    mesh.attributes.new("vector", "FLOAT_VECTOR", "FACE").data.foreach_set("vector", rng.random(len(quads) * 3).astype(np.float32))
-    mesh.color_attributes.new("paint", "FLOAT_COLOR", "CORNER").data.foreach_set("color", rng.random(len(corner) * 4).astype(np.float32))
+    mesh.attributes.new("vector", "FLOAT_VECTOR", "FACE").data.foreach_set(
+        "vector", rng.random(len(quads) * 3).astype(np.float32)
+    )
+    mesh.color_attributes.new("paint", "FLOAT_COLOR", "CORNER").data.foreach_set(
+        "color", rng.random(len(corner) * 4).astype(np.float32)
+    )
     patch = bpy.data.objects.new("Patch", mesh)
     patch.location, patch.rotation_euler, patch.scale = (0.1, 0.2, -0.1), (0.2, -0.1, 0.4), (1.5, 1.2, 0.9)
     patch.color, patch.pass_index = (0.2, 0.4, 0.6, 0.7), 3

@@ -36,17 +36,20 @@ float srgb_to_linear(float x) {
   return lerp(table[size_t(i)], table[size_t(i) + 1], position - float(i));
 }
 
+// One texel with its colour times alpha; bytes are rounded down, as in Cycles.
 Rgba texel(const ImageTile& t, int x, int y) {
   const size_t at = 4 * (size_t(y) * size_t(t.width) + size_t(x));
+  const bool straight = t.alpha == AlphaMode::kStraight, opaque = t.alpha == AlphaMode::kNone;
   Rgba c;
   if (t.bytes) {
-    for (int i = 0; i < 4; ++i) c.v[i] = float(t.bytes[at + size_t(i)]) * (1.0f / 255.0f);
+    const uint8_t* p = t.bytes + at;
+    const bool multiply = straight && p[3] != 255;
+    for (int i = 0; i < 3; ++i) c.v[i] = float(multiply ? p[i] * p[3] / 255 : p[i]) * (1.0f / 255.0f);
+    c.v[3] = opaque ? 1.0f : float(p[3]) * (1.0f / 255.0f);
   } else {
-    for (int i = 0; i < 4; ++i) c.v[i] = t.floats[at + size_t(i)];
-  }
-  if (t.alpha == AlphaMode::kNone) c.v[3] = 1.0f;
-  if (t.alpha == AlphaMode::kStraight && c.v[3] != 1.0f) {
-    for (int i = 0; i < 3; ++i) c.v[i] *= c.v[3];
+    const float* p = t.floats + at;
+    for (int i = 0; i < 3; ++i) c.v[i] = straight ? p[i] * p[3] : p[i];
+    c.v[3] = opaque ? 1.0f : p[3];
   }
   return c;
 }
