@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 
 from ..nodes.attributes import look_up, property_paths
-from ..nodes.attributes import look_up, property_paths
 from ..nodes.compile import Compiler
 from ..scene_data import Scene
 from .warnings import Warnings

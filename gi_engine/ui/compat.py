@@ -30,7 +30,6 @@ FROM_EEVEE = {
     "EEVEE_MATERIAL_PT_surface",
     "EEVEE_WORLD_PT_surface",
     "MATERIAL_PT_preview",
-    "VIEWLAYER_PT_override",
     "WORLD_PT_context_world",
 }
 

@@ -134,6 +134,23 @@ class GI_VIEWLAYER_PT_passes(Panel, bpy.types.Panel):
             column.prop(layer.gi_engine, name)
 
 
+class GI_VIEWLAYER_PT_override(Panel, bpy.types.Panel):
+    bl_label = "Override and Filter"
+    bl_context = "view_layer"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layer = context.view_layer
+        column = columns(self.layout)
+        column.prop(layer, "material_override")
+        if hasattr(layer, "world_override"):  # from 5.0 on
+            column.prop(layer, "world_override")
+        column.prop(layer, "samples")
+        column = columns(self.layout)
+        column.prop(layer, "use_sky", text="Environment")
+        column.prop(layer, "use_solid", text="Surfaces")
+
+
 CLASSES = (
     GI_RENDER_PT_integrator,
     GI_RENDER_PT_sampling,
@@ -141,5 +158,6 @@ CLASSES = (
     GI_RENDER_PT_film,
     GI_RENDER_PT_performance,
     GI_VIEWLAYER_PT_passes,
+    GI_VIEWLAYER_PT_override,
 )
 register, unregister = bpy.utils.register_classes_factory(CLASSES)
