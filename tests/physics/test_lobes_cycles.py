@@ -194,3 +194,45 @@ def test_lobe_against_cycles(plane, tmp_path, case, cos_o):
         mean, error = mean * settings.get("Color", WHITE)[:3], error * settings.get("Color", WHITE)[:3]
     # One per mille is for Cycles' approximate error function in Beckmann's model.
     assert (np.abs(mean - theirs) < 4.5 * np.hypot(error, their_error) + 1e-3 * theirs).all(), (mean, theirs)
+
+
+def fill_bumped(material, normal):
+    """Half diffuse, half glossy, both about `normal`."""
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    mix, xyz = nodes.new("ShaderNodeMixShader"), nodes.new("ShaderNodeCombineXYZ")
+    for socket, value in zip(xyz.inputs, normal, strict=True):
+        socket.default_value = value
+    for i, kind in enumerate(("ShaderNodeBsdfDiffuse", GLOSSY)):
+        node = nodes.new(kind)
+        node.inputs["Color"].default_value = [1, 1, 1, 1]
+        node.inputs["Roughness"].default_value = 0.5 * i
+        links.new(xyz.outputs[0], node.inputs["Normal"])
+        links.new(node.outputs[0], mix.inputs[1 + i])
+        if i:
+            node.distribution = "GGX"
+    links.new(mix.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs[0])
+
+
+@pytest.mark.parametrize("sampling", ["NONE", "AUTOMATIC"])
+@pytest.mark.parametrize(("tilt", "cos_o"), [(0.7, 0.9), (0.7, 0.3), (-0.5, 0.9)])
+def test_bumped_mix_against_cycles(plane, tmp_path, tilt, cos_o, sampling):
+    """Bumps shadow diffuse light at the terminator, and cut off what would come through the surface."""
+    scene, material = plane
+    normal = [float(np.sin(tilt)), 0.0, float(np.cos(tilt))]
+    fill_bumped(material, normal)
+    wo = chi2.directions(np.array([cos_o]), np.array([0.0]))[0]
+    scene.world.cycles.sampling_method = sampling
+    theirs, their_error = cycles(scene, wo, tmp_path / "plane.exr")
+    scene.world.cycles.sampling_method = "NONE"
+
+    bsdf, n = _core.TestBsdf(), 300_000
+    bsdf.begin([0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0])
+    bsdf.add("lambert", {}, [0.5] * 3, normal)
+    bsdf.add("ggx_reflection", {"alpha": [0.25]}, [0.5] * 3, normal)
+    s = bsdf.sample(wo.tolist(), np.random.default_rng(5).random((n, 3), np.float32))
+    s = s[s[:, 6] > 0]
+    value = s[:, 3:6].astype(float) / s[:, 6:7] * lights(s[:, :3])
+    mean = value.sum(0) / n
+    error = np.sqrt((value**2).sum(0) / n - mean**2) / np.sqrt(n)
+    assert (np.abs(mean - theirs) < 4.5 * np.hypot(error, their_error) + 1e-3 * theirs).all(), (mean, theirs)
