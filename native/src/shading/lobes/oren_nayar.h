@@ -22,10 +22,10 @@ struct OrenNayar {
   LobeEval eval(Vec3 wo, Vec3 wi) const {
     if (transmits_) wi.z = -wi.z;
     if (wi.z <= 0.0f) return {};
-    wo.z = std::max(wo.z, 0.0f);
-    float s = wi.x * wo.x + wi.y * wo.y;
-    if (s > 0.0f) s /= std::max(wi.z, wo.z);
-    const Rgb f = Rgb(a_ + b_ * s) + multiple_ * ((1.0f - single_albedo(wo.z)) * (1.0f - single_albedo(wi.z)));
+    const float cos_o = std::max(wo.z, 0.0f);  // bumped normals can turn away from the viewer
+    float s = dot(wi, wo) - wi.z * cos_o;
+    if (s > 0.0f) s /= std::max(wi.z, cos_o);
+    const Rgb f = Rgb(a_ + b_ * s) + multiple_ * ((1.0f - single_albedo(cos_o)) * (1.0f - single_albedo(wi.z)));
     return {f * wi.z, wi.z * kInvPi};
   }
   std::optional<LobeSample> sample(Vec3 wo, Vec2 u, float) const {

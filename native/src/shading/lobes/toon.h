@@ -14,7 +14,7 @@ struct Toon {
   uint8_t flags() const { return kReflection | (glossy_ ? kGlossy : kDiffuse); }
 
   LobeEval eval(Vec3 wo, Vec3 wi) const {
-    if (wi.z <= 0.0f || wo.z <= 0.0f) return {};
+    if (wi.z <= 0.0f || (glossy_ && wo.z <= 0.0f)) return {};
     const Vec3 axis = this->axis(wo);
     // The angle from the chord: exact for tiny cones, where acos of a dot product is not.
     const float angle = 2.0f * std::asin(std::min(1.0f, 0.5f * length(wi - axis)));
@@ -25,7 +25,7 @@ struct Toon {
   std::optional<LobeSample> sample(Vec3 wo, Vec2 u, float) const {
     const Vec3 w = sample_cone(u, one_minus_cos_), axis = this->axis(wo);
     const Vec3 wi = normalize(Frame::from_normal(axis).to_world(w));
-    if (wi.z <= 0.0f || wo.z <= 0.0f) return {};
+    if (wi.z <= 0.0f || (glossy_ && wo.z <= 0.0f)) return {};
     const float p = 0.5f * kInvPi / one_minus_cos_;
     const float angle = 2.0f * std::asin(std::min(1.0f, safe_sqrt(0.5f * u.x * one_minus_cos_)));
     return LobeSample{wi, Rgb(p * intensity(angle)), p, flags(), glossy_ ? size_ / (kPi / 2) : 1.0f};
