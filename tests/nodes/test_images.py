@@ -1,0 +1,205 @@
+"""Reading Blender's images: every source and colour space, and what is shown in place of files that cannot be read."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from gi_engine.export.images import image_key, read_image
+from gi_engine.nodes.compile import Compiler
+from gi_engine.scene_data import Scene
+
+SRGB_ORANGE = (200, 100, 50, 255)
+
+
+@pytest.fixture(autouse=True)
+def empty_file():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+def write_png(path, color=SRGB_ORANGE, size=(3, 2)):
+    image = bpy.data.images.new("writer", *size, alpha=True)
+    image.pixels.foreach_set(np.tile(np.array(color, np.float32) / 255, size[0] * size[1]))
+    image.filepath_raw, image.file_format = str(path), "PNG"
+    image.save()
+    bpy.data.images.remove(image)
+    return path
+
+
+def read(image, user=None):
+    """The only tile, and the warnings."""
+    warnings = []
+    tiles = read_image(image, warnings.append, user)
+    assert len(tiles) == 1
+    return tiles[0], warnings
+
+
+def test_file(tmp_path):
+    tile, warnings = read(bpy.data.images.load(str(write_png(tmp_path / "a.png"))))
+    assert not warnings
+    assert tile.pixels.shape == (2, 3, 4) and tile.pixels.dtype == np.uint8
+    assert tile.srgb and tile.alpha == "STRAIGHT"
+    assert tuple(tile.pixels[1, 2]) == SRGB_ORANGE
+
+
+def test_packed_file_that_is_gone(tmp_path):
+    path = write_png(tmp_path / "a.png")
+    image = bpy.data.images.load(str(path))
+    image.pack()
+    path.unlink()
+    tile, warnings = read(image)
+    assert not warnings and tuple(tile.pixels[0, 0]) == SRGB_ORANGE
+
+
+def test_row_zero_is_at_the_bottom():
+    image = bpy.data.images.new("rows", 1, 2, alpha=True)
+    image.pixels.foreach_set([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    tile, _ = read(image)
+    assert tile.pixels[0, 0, 0] == 0 and tile.pixels[1, 0, 0] == 255
+
+
+def test_float_image_is_scene_linear():
+    image = bpy.data.images.new("float", 2, 2, alpha=True, float_buffer=True)
+    image.pixels.foreach_set(np.tile(np.array([4.0, 0.5, 0.25, 1.0], np.float32), 4))
+    tile, warnings = read(image)
+    assert not warnings and tile.pixels.dtype == np.float32 and tile.alpha == "PREMULTIPLIED"
+    assert tile.pixels[0, 0].tolist() == [4.0, 0.5, 0.25, 1.0]
+
+
+@pytest.mark.parametrize(("space", "srgb"), [("sRGB", True), ("Non-Color", False), ("Linear Rec.709", False)])
+def test_plain_color_spaces_stay_bytes(space, srgb):
+    image = bpy.data.images.new("space", 1, 1)
+    image.colorspace_settings.name = space
+    tile, _ = read(image)
+    assert tile.pixels.dtype == np.uint8 and tile.srgb is srgb
+    assert (tile.alpha == "CHANNEL_PACKED") == (space == "Non-Color")
+
+
+def test_other_color_spaces_are_converted_by_blender():
+    image = bpy.data.images.new("wide", 1, 1, alpha=True)
+    image.colorspace_settings.name = "Linear Rec.2020"
+    image.pixels.foreach_set(np.array([51, 102, 204, 128], np.float32) / 255)
+    tile, warnings = read(image)
+    assert not warnings and tile.pixels.dtype == np.float32
+    # ITU-R BT.2087.
+    to_709 = np.array(
+        [[1.660491, -0.587641, -0.072850], [-0.124550, 1.132900, -0.008349], [-0.018151, -0.100579, 1.118730]]
+    )
+    np.testing.assert_allclose(tile.pixels[0, 0, :3], to_709 @ (np.array([51, 102, 204]) / 255), atol=2e-3)
+    assert tile.pixels[0, 0, 3] == pytest.approx(128 / 255)
+    assert [i.name for i in bpy.data.images] == ["wide"], "helpers are left behind"
+
+
+def test_frames_of_a_sequence(tmp_path):
+    for frame in (1, 2, 3):
+        write_png(tmp_path / f"s_{frame:03d}.png", (frame * 10, 0, 0, 255))
+    image = bpy.data.images.load(str(tmp_path / "s_001.png"))
+    image.source = "SEQUENCE"
+    material = bpy.data.materials.new("m")
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    node.image_user.frame_duration, node.image_user.frame_start = 3, 1
+    keys = set()
+    for frame in (1, 2, 3):
+        bpy.context.scene.frame_set(frame)
+        tile, warnings = read(image, node.image_user)
+        assert not warnings and tile.pixels[0, 0, 0] == frame * 10
+        keys.add(image_key(image, node.image_user))
+    assert len(keys) == 3
+
+
+def test_udim_tiles(tmp_path):
+    for number, red in ((1001, 10), (1002, 20), (1011, 30)):
+        write_png(tmp_path / f"t.{number}.png", (red, 0, 0, 255))
+    image = bpy.data.images.load(str(tmp_path / "t.1001.png"))
+    image.source = "TILED"
+    image.filepath_raw = str(tmp_path / "t.<UDIM>.png")
+    for number in (1002, 1011):
+        image.tiles.new(tile_number=number)
+    warnings = []
+    tiles = {tile.tile: tile.pixels[0, 0, 0] for tile in read_image(image, warnings.append)}
+    assert not warnings and tiles == {1001: 10, 1002: 20, 1011: 30}
+
+
+def test_udim_tile_that_is_missing(tmp_path):
+    write_png(tmp_path / "t.1001.png")
+    image = bpy.data.images.load(str(tmp_path / "t.1001.png"))
+    image.source = "TILED"
+    image.filepath_raw = str(tmp_path / "t.<UDIM>.png")
+    image.tiles.new(tile_number=1002)
+    warnings = []
+    tiles = read_image(image, warnings.append)
+    assert tuple(tiles[0].pixels[0, 0]) == SRGB_ORANGE
+    assert tiles[1].pixels.tolist() == [[[255, 0, 255, 255]]]
+    assert len(warnings) == 1 and "t.1002.png" in warnings[0]
+
+
+# -------------------------------------------------------------------- what cannot be read
+
+
+def broken(path, how: str):
+    """An image datablock whose file is then damaged."""
+    write_png(path, size=(64, 64))
+    image = bpy.data.images.load(str(path))
+    if how == "missing":
+        path.unlink()
+    elif how == "empty":
+        path.write_bytes(b"")
+    elif how == "cut off":
+        path.write_bytes(path.read_bytes()[:20])
+    else:
+        path.write_bytes(b"this is no picture")
+    return image
+
+
+@pytest.mark.parametrize(
+    ("how", "said"),
+    [
+        ("missing", "there is no file"),
+        ("empty", "is empty"),
+        ("cut off", "damaged"),
+        ("text", "damaged or of an unknown format"),
+    ],
+)
+def test_broken_file_is_magenta_with_a_warning(how, said, tmp_path):
+    tile, warnings = read(broken(tmp_path / "broken.png", how))
+    assert tile.pixels.tolist() == [[[255, 0, 255, 255]]]
+    assert len(warnings) == 1 and said in warnings[0] and "broken.png" in warnings[0]
+
+
+def test_warning_names_material_and_node(tmp_path):
+    material = bpy.data.materials.new("Brass")
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    tree = material.node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.name = "Scratches"
+    texture.image = broken(tmp_path / "broken.png", "missing")
+    shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+    tree.links.new(texture.outputs["Color"], shader.inputs["Base Color"])
+    tree.links.new(texture.outputs["Alpha"], shader.inputs["Alpha"])
+    warnings, data = [], Scene()
+    Compiler(data, bpy.context.evaluated_depsgraph_get(), warnings.append).material(material)
+    assert len(warnings) == 1 and len(data.images) == 1
+    assert all(name in warnings[0] for name in ("Brass", "Scratches", "broken.png"))
+
+
+def test_image_of_several_nodes_is_read_once(tmp_path):
+    image = bpy.data.images.load(str(write_png(tmp_path / "a.png")))
+    data = Scene()
+    compiler = Compiler(data, bpy.context.evaluated_depsgraph_get(), pytest.fail)
+    for name in ("one", "two"):
+        material = bpy.data.materials.new(name)
+        if bpy.app.version < (5, 0, 0):
+            material.use_nodes = True
+        tree = material.node_tree
+        shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+        for socket in ("Base Color", "Emission Color"):
+            texture = tree.nodes.new("ShaderNodeTexImage")
+            texture.image = image
+            tree.links.new(texture.outputs["Color"], shader.inputs[socket])
+        compiler.material(material)
+    assert len(data.images) == 1
