@@ -193,7 +193,7 @@ def load_image(b) -> int:
 def image(b):
     n = b.node
     if n.image is None:
-        return no_image(b, "magenta")
+        return no_image(b)
     lookup = (INTERPOLATIONS[n.interpolation], EXTENSIONS[n.extension], b.wants("Alpha"))
     number = load_image(b)
     if n.projection == "BOX":
@@ -209,7 +209,7 @@ def image(b):
 def environment(b):
     n = b.node
     if n.image is None:
-        return no_image(b, "magenta")
+        return no_image(b)
     imm = (load_image(b), ENVIRONMENTS[n.projection], INTERPOLATIONS[n.interpolation])
     color, _alpha = b.op("environment", vector(b, direction), imm=imm, kind=COLOR)
     b.output("Color", color)
@@ -219,11 +219,10 @@ def direction(b):
     return b.op("position")
 
 
-def no_image(b, what: str) -> None:
-    """Blender shows nodes that have no image black, with alpha 0 (what is missing is magenta)."""
-    b.warn("has no image and gives black")
-    b.output("Color", b.constant(0.0, 0.0, 0.0, kind=COLOR))
-    b.output("Alpha", b.constant(0.0))
+def no_image(b) -> None:
+    b.warn("has no image and shows magenta")
+    b.output("Color", b.constant(1.0, 0.0, 1.0, kind=COLOR))
+    b.output("Alpha", b.constant(1.0))
 
 
 @rule("ShaderNodeTexSky")

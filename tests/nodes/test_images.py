@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
+from gi_engine import native
 from gi_engine.export.images import image_key, read_image
 from gi_engine.nodes.compile import Compiler
 from gi_engine.scene_data import Scene
@@ -203,3 +204,51 @@ def test_image_of_several_nodes_is_read_once(tmp_path):
             tree.links.new(texture.outputs["Color"], shader.inputs[socket])
         compiler.material(material)
     assert len(data.images) == 1
+
+
+def emitter(texture_node: str, image=None):
+    """A material that emits a texture of the position."""
+    material = bpy.data.materials.new("emitter")
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    position, texture = tree.nodes.new("ShaderNodeNewGeometry"), tree.nodes.new(texture_node)
+    emission, output = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
+    texture.image = image
+    tree.links.new(position.outputs["Position"], texture.inputs["Vector"])
+    tree.links.new(texture.outputs["Color"], emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    return material
+
+
+@pytest.mark.parametrize("node", ["ShaderNodeTexImage", "ShaderNodeTexEnvironment"])
+def test_node_without_image_is_magenta_with_a_warning(node):
+    data, warnings = Scene(), []
+    data.programs = [Compiler(data, bpy.context.evaluated_depsgraph_get(), warnings.append).material(emitter(node))]
+    assert native.module().emission(data, 0, np.zeros((1, 3), np.float32), (0.0, 0.0, 1.0)).tolist() == [[1, 0, 1]]
+    assert len(warnings) == 1 and "no image" in warnings[0]
+
+
+def test_coordinates_choose_the_udim_tile(tmp_path):
+    """One tile each metre; magenta where there is none, on the left, below and beyond the tenth."""
+    for number, red in ((1001, 51), (1002, 102), (1011, 204)):
+        write_png(tmp_path / f"t.{number}.png", (red, 0, 0, 255))
+    image = bpy.data.images.load(str(tmp_path / "t.1001.png"))
+    image.source = "TILED"
+    image.filepath_raw = str(tmp_path / "t.<UDIM>.png")
+    image.colorspace_settings.name = "Non-Color"
+    for number in (1002, 1011):
+        image.tiles.new(tile_number=number)
+    data = Scene()
+    data.programs = [
+        Compiler(data, bpy.context.evaluated_depsgraph_get(), pytest.fail).material(
+            emitter("ShaderNodeTexImage", image)
+        )
+    ]
+    points = np.array(
+        [[0.5, 0.5, 0], [1.5, 0.5, 0], [0.5, 1.5, 0], [1.5, 1.5, 0], [-0.5, 0.5, 0], [10.5, 0.5, 0]], np.float32
+    )
+    colors = native.module().emission(data, 0, points, (0.0, 0.0, 1.0))
+    np.testing.assert_allclose(colors[:3, 0], [0.2, 0.4, 0.8], atol=1e-6)
+    assert (colors[3:] == (1, 0, 1)).all()
