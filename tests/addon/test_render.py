@@ -13,7 +13,7 @@ from gi_engine import control, engine, native
 from gi_engine.passes import PASSES
 
 from . import exr
-from .conftest import add, mesh
+from .conftest import add, grid, mesh
 
 SQUARE = ((-50, -50, 0), (50, -50, 0), (50, 50, 0), (-50, 50, 0))
 SCALE = 4.0  # metres across the orthographic camera's longer side
@@ -159,6 +159,39 @@ def test_animations_render_every_frame_and_warn_once(plane, tmp_path, capfd):
         control.current = None
     assert heights == [1, 2, 3] and len(list(tmp_path.glob("frame_*"))) == 3
     assert capfd.readouterr().out.count("no faces") <= 1
+
+
+CAMERAS = (
+    {"type": "PERSP", "shift_x": 0.1, "shift_y": -0.2},
+    {"type": "PERSP", "sensor_fit": "VERTICAL"},
+    {"type": "ORTHO", "ortho_scale": 4},
+    {"type": "PANO", "panorama_type": "EQUIRECTANGULAR", "shift_x": 0.2, "shift_y": 0.1, "latitude_min": -1},
+)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_pixels_are_those_of_cycles(scene, rendered, camera):
+    """Geometry, normals, UV and depth of the same scene; tolerances are what a hundredth of a pixel makes."""
+    for name, value in camera.items():
+        setattr(scene.camera.data, name, value)
+    scene.camera.rotation_euler = (0.1, 0.05, 0.3)
+    add(scene, "Bent", grid(8), scale=(3, 2, 4), location=(-1.5, -1, 0))
+    for i in range(3):
+        add(scene, f"Square {i}", mesh(), location=(i - 1, i - 1.5, 1), rotation_euler=(0.5, i, 0))
+    scene.render.resolution_x, scene.render.resolution_y = 96, 64
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "GAUSSIAN", 0.01
+    scene.cycles.use_denoising = False
+    layer = scene.view_layers[0]
+    layer.use_pass_z = layer.use_pass_normal = layer.use_pass_position = layer.use_pass_uv = True
+    ours = rendered(scene)
+    scene.render.engine = "CYCLES"
+    theirs = rendered(scene)
+    hit = [image["ViewLayer.Depth"][..., 0] < 1e9 for image in (ours, theirs)]
+    assert (hit[0] != hit[1]).mean() < 0.002 and hit[0].sum() > 100
+    both = hit[0] & hit[1]
+    for name, tolerance in (("Depth", 5e-3), ("Position", 5e-3), ("Normal", 0.02), ("UV", 2e-3)):
+        difference = np.abs(ours[f"ViewLayer.{name}"] - theirs[f"ViewLayer.{name}"])[both]
+        assert np.quantile(difference, 0.98) < tolerance, name
 
 
 # ------------------------------------------------------------------ failing
