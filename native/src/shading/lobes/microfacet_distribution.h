@@ -99,7 +99,10 @@ struct Beckmann {
   static float sample_slope(float tan_theta, float u) {
     const float k = tan_theta * 0.56418958f, cot = 1.0f / tan_theta;
     const float top = std::erf(cot), total = 1.0f + top + k * std::exp(-cot * cot);
-    float lo = -1.0f, hi = top, b = lerp(lo, hi, u), x = 0;
+    float lo = -1.0f, hi = top, x = 0;
+    // Start where exp(−erf⁻¹(b)²) ≈ 1 − b² would put it.
+    float b = (0.5f - safe_sqrt(k * (k + 1.0f - u * (1.0f + top + k * (1.0f - top * top))) + 0.25f)) / k;
+    if (!(b > lo && b < hi)) b = lerp(lo, hi, u);
     for (int i = 0; i < 24; ++i) {
       x = erf_inverse(b);
       const float f = 1.0f + b + k * std::exp(-x * x) - u * total;
