@@ -40,17 +40,13 @@ struct Parameters {
 Fresnel bare_fresnel(const Parameters& p) {
   const float ior = p.f("ior", 1.0f);
   switch (int(p.f("fresnel", 0.0f))) {
-    case 1:
-      return Fresnel::dielectric(ior);
+    case 1: return Fresnel::dielectric(ior);
     case 2:
       return Fresnel::schlick(ior, p.c("f0", Rgb(f0_from_ior(ior))), p.c("f90", Rgb(1.0f)), p.c("reflection_tint", Rgb(1.0f)),
                               p.c("transmission_tint", Rgb(1.0f)), p.f("exponent", -1.0f));
-    case 3:
-      return Fresnel::f82_tint(p.c("f0", Rgb(0.8f)), p.c("edge_tint", Rgb(1.0f)));
-    case 4:
-      return Fresnel::conductor(p.c("n", Rgb(1.0f)), p.c("k", Rgb(1.0f)));
-    default:
-      return Fresnel::none(ior);
+    case 3: return Fresnel::f82_tint(p.c("f0", Rgb(0.8f)), p.c("edge_tint", Rgb(1.0f)));
+    case 4: return Fresnel::conductor(p.c("n", Rgb(1.0f)), p.c("k", Rgb(1.0f)));
+    default: return Fresnel::none(ior);
   }
 }
 

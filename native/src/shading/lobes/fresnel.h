@@ -144,28 +144,23 @@ inline FresnelTerms Fresnel::operator()(float cos_h) const {
       const Rgb f = film && exponent < 0.0f ? film_dielectric(cos_h) : lerp(f0, f90, schlick_weight(cos_h));
       return {f * reflection_tint, (Rgb(1.0f) - f) * transmission_tint};
     }
-    case Model::kF82:
-      return {film ? film_f82(cos_h) : f82(cos_h, f0, f90), Rgb()};
-    case Model::kConductor:
-      return {film ? film_conductor(cos_h) : conductor_at(cos_h), Rgb()};
+    case Model::kF82: return {film ? film_f82(cos_h) : f82(cos_h, f0, f90), Rgb()};
+    case Model::kConductor: return {film ? film_conductor(cos_h) : conductor_at(cos_h), Rgb()};
   }
   return {};
 }
 
 inline Rgb Fresnel::mean() const {
   switch (model) {
-    case Model::kNone:
-      return Rgb(1.0f);
-    case Model::kDielectric:
-      return reflection_tint * fresnel_dielectric_mean(ior);
+    case Model::kNone: return Rgb(1.0f);
+    case Model::kDielectric: return reflection_tint * fresnel_dielectric_mean(ior);
     case Model::kSchlick: {
       const float lowest = f0_from_ior(ior);
       const float s = exponent < 0.0f ? clamp01((fresnel_dielectric_mean(ior) - lowest) / (1.0f - lowest))
                                       : 2.0f / ((exponent + 3.0f) * exponent + 2.0f);
       return reflection_tint * lerp(f0, f90, s);
     }
-    case Model::kF82:
-      return f82_mean(f0, f90);
+    case Model::kF82: return f82_mean(f0, f90);
     case Model::kConductor: {  // through the F82 curve with the same values head-on and at cos θ = 1/7
       const Rgb head_on = conductor_at(1.0f), edge = conductor_at(1.0f / 7.0f);
       const float f = 6.0f / 7.0f, f5 = f * f * f * f * f;

@@ -13,7 +13,6 @@
 
 namespace gi {
 
-using Lobe = std::variant<Lambert, OrenNayar, Translucent, GgxLobe, BeckmannLobe, AshikhminShirley, ThinTransmission, Sheen,
-                          Velvet, Toon>;
+using Lobe = std::variant<Lambert, OrenNayar, Translucent, GgxLobe, BeckmannLobe, AshikhminShirley, ThinTransmission, Sheen, Velvet, Toon>;
 
 }  // namespace gi
