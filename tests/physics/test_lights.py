@@ -533,6 +533,14 @@ def test_near_lights_are_chosen_before_far_ones():
     assert p[0] > 0.999
 
 
+def test_choice_knows_how_strong_a_lamps_program_is():
+    lamps = [lamp("POINT", program=k, matrix=matrix((x, 0, 2))) for k, x in enumerate((-1.0, 1.0))]
+    p = build(sd.Scene(lights=lamps, programs=[emission(strength=1), emission(strength=9)])).pick_probabilities(
+        ORIGIN, UP
+    )[0]
+    np.testing.assert_allclose(p, [0.1, 0.9], rtol=1e-4)
+
+
 def test_choice_loses_no_light():
     """Sum over all lights, one by one, against choosing among them."""
     lights = build(many_lights(60))

@@ -6,7 +6,7 @@
 #include <thread>
 #include <variant>
 
-#include "core/parallel.h"
+#include "core/sampler.h"
 #include "lights/area_light.h"
 #include "lights/lamp_bvh.h"
 #include "lights/light_tree.h"
@@ -27,6 +27,7 @@ struct Lamp {
   const LampData* data;
   Affine to_lamp;
   bool findable;  // has a shape that rays can meet
+  float strength = 0;  // |luminance| of its colour times what its program makes of it, on average
 };
 
 Shape make_shape(const LampData& lamp) {
@@ -66,7 +67,27 @@ void bound(const AreaLight& light, LightBounds& b) {
 }
 void bound(const SunLight&, LightBounds&) {}
 
-float hardness(const Shape& shape) {  // what a lamp of colour 1 weighs: 0 leaves it out
+const PointLight* sphere_of(const Shape& shape) {  // null where the lamp is no sphere
+  const auto* spot = std::get_if<SpotLight>(&shape);
+  const PointLight* point = spot ? &spot->point : std::get_if<PointLight>(&shape);
+  return point && point->sphere ? point : nullptr;
+}
+
+// A place on the lamp and a direction away from it, for trying out its program.
+std::pair<Vec3, Vec3> emit(const PointLight& light, Vec2 u) {
+  const Vec3 out = sample_uniform_sphere(u);
+  return {light.center + out * light.radius, out};
+}
+std::pair<Vec3, Vec3> emit(const SpotLight& light, Vec2 u) {
+  const Vec3 out = Frame::from_normal(light.axis).to_world(sample_cone(u, light.one_minus_cos_world));
+  return {light.point.center + out * light.point.radius, out};
+}
+std::pair<Vec3, Vec3> emit(const AreaLight& light, Vec2 u) {
+  return {light.center + light.u * (light.size_u * (u.x - 0.5f)) + light.v * (light.size_v * (u.y - 0.5f)), light.normal};
+}
+std::pair<Vec3, Vec3> emit(const SunLight& light, Vec2) { return {light.direction, -light.direction}; }
+
+float weight_of(const Shape& shape) {  // of a lamp of colour 1: 0 leaves it out
   return std::visit(
       [](const auto& s) {
         if constexpr (std::is_same_v<std::decay_t<decltype(s)>, SunLight>) {
@@ -111,7 +132,7 @@ struct LightSet::Impl {
       if (std::holds_alternative<SunLight>(lamps[i].shape)) continue;
       LightBounds b;
       std::visit([&](const auto& shape) { bound(shape, b); }, lamps[i].shape);
-      b.power *= magnitude(lamps[i].data->color);
+      b.power *= lamps[i].strength;
       bounds.push_back(b), tree_light.push_back(i);
     }
     add_triangles(threads, bounds);
@@ -126,7 +147,7 @@ struct LightSet::Impl {
     for (const LampData& data : scene.data().lamps) {
       if (!is_finite(data.color) || !(magnitude(data.color) > 0.0f)) continue;
       Lamp lamp{make_shape(data), &data, data.matrix.inverse(), false};
-      const float weight = hardness(lamp.shape);
+      const float weight = weight_of(lamp.shape);
       if (!(weight > 0.0f) || !std::isfinite(weight)) continue;
       std::visit(
           [&](const auto& shape) {
@@ -145,6 +166,7 @@ struct LightSet::Impl {
             }
           },
           lamp.shape);
+      lamp.strength = magnitude(data.color) * program_strength(lamp);
       lamps.push_back(lamp);
     }
     bvh = LampBvh(std::move(items));
@@ -190,7 +212,7 @@ struct LightSet::Impl {
     const SunLight& sun = std::get<SunLight>(lamp.shape);
     float c = length_squared(query.normal) > 0.0f ? dot(query.normal, sun.direction) : 1.0f;
     if (query.transmission) c = std::abs(c);
-    return sun.irradiance() * magnitude(lamp.data->color) * std::max(c, 0.02f);
+    return sun.irradiance() * lamp.strength * std::max(c, 0.02f);
   }
   float far_weight(const LightQuery& query) const {
     float sum = world.emits() ? world.irradiance() : 0.0f;
@@ -239,13 +261,31 @@ struct LightSet::Impl {
     p.position = std::isfinite(distance) ? origin + wi * distance : wi;
     p.object_position = std::isfinite(distance) ? lamp.to_lamp.point(p.position) : lamp.to_lamp.vector(wi);
     p.ng = p.ns = p.wo;
+    p.lamp_to_world = &lamp.data->matrix;
     if (const auto* area = std::get_if<AreaLight>(&lamp.shape)) {
       p.ng = p.ns = area->normal;
       const Vec2 c = area->coordinates(p.position);
       p.b1 = c.y + 0.5f, p.b2 = -c.x - c.y;  // Cycles' order, for the Parametric output
+    } else if (const PointLight* ball = sphere_of(lamp.shape)) {
+      p.ng = p.ns = normalize_or(p.position - ball->center, p.wo);
     }
     p.path = path;
     return scene.run_emission(lamp.data->program, p);
+  }
+
+  // Only for choosing among lamps: never 0, since the samples may miss what the program shows.
+  float program_strength(const Lamp& lamp) const {
+    if (lamp.data->program < 0) return 1.0f;
+    constexpr int kPoints = 32;
+    float sum = 0;
+    for (int k = 0; k < kPoints; ++k) {
+      const Vec2 u{(float(k) + 0.5f) / kPoints, to_unit_float(reverse_bits(uint32_t(k)))};
+      const auto [place, out] = std::visit([&](const auto& s) { return emit(s, u); }, lamp.shape);
+      const bool is_sun = std::holds_alternative<SunLight>(lamp.shape);
+      const float m = magnitude(lamp_program(lamp, place + out, -out, is_sun ? kInf : 1.0f, seen_by_light({}, 1.0f)));
+      sum += std::isfinite(m) ? m : 0.0f;
+    }
+    return std::max(sum / kPoints, 1e-3f);
   }
 
   static void set_scales(LightSample& s, uint32_t visibility, float diffuse, float glossy, float transmission) {

@@ -12,7 +12,8 @@ inline const Instance* instance_of(const ShadeState& s) {
 
 inline Vec3 normal_to_object(const ShadeState& s, Vec3 n) {
   const Instance* i = instance_of(s);
-  return i ? normalize(i->to_world.transposed_vector(n)) : n;
+  const Affine* to_world = i ? &i->to_world : s.point.lamp_to_world;
+  return to_world ? normalize(to_world->transposed_vector(n)) : n;
 }
 inline Vec3 normal_to_world(const ShadeState& s, Vec3 n) {
   const Instance* i = instance_of(s);

@@ -39,6 +39,7 @@ struct ShadingPoint {
   Vec3 dpdx, dpdy;       // footprint of the pixel on the surface, world: what Bump and filtering step by
   float db1_dx = 0, db2_dx = 0, db1_dy = 0, db2_dy = 0;  // the same in barycentrics
   PathState path;
+  const Affine* lamp_to_world = nullptr;  // on lamps
   const float* instance_info = nullptr;  // see scene/scene.h InstanceInfo
 };
 
