@@ -11,6 +11,10 @@ from dataclasses import dataclass, field, replace
 from .scene_data import Scene, Settings
 
 
+class RenderError(RuntimeError):
+    """The scene could not be read or rendered; the message names what is wrong."""
+
+
 @dataclass
 class Progress:
     """The state of a running render, as the engine tells it after every poll."""

@@ -10,10 +10,7 @@ from pathlib import Path
 import bpy
 
 from . import control
-
-
-class RenderError(RuntimeError):
-    """The scene could not be read or rendered; the message names what is wrong."""
+from .control import RenderError
 
 
 def open_file(path: Path, factory_settings: bool) -> None:
@@ -38,10 +35,6 @@ def register_once() -> None:
 def message_of(error: RuntimeError) -> str:
     """What Blender's operators say, without their decoration."""
     return str(error).strip().removeprefix("Error: ")
-
-
-def use_engine(scene: bpy.types.Scene) -> None:
-    scene.render.engine = "GI_ENGINE"
 
 
 def set_resolution(scene: bpy.types.Scene, width: int, height: int) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gi_engine import cli
+from gi_engine import arguments, cli
 
 
 def refused(capfd, *argv) -> str:
@@ -59,7 +59,7 @@ def test_help_is_no_error(capfd):
     ("text", "expected"), [("7", [7]), ("2-4", [2, 3, 4]), ("-3", [-3]), ("-3--1", [-3, -2, -1]), ("-1-1", [-1, 0, 1])]
 )
 def test_frames(text, expected):
-    assert list(cli.frames(text)) == expected
+    assert list(arguments.frames(text)) == expected
 
 
 PARAMETERS = {
@@ -75,7 +75,7 @@ PARAMETERS = {
 
 @pytest.mark.parametrize("value", [{"max_bounces": "3"}, {"alpha": "0.25"}, {"caustics": "off"}, {"mode": "off"}])
 def test_good_parameters(value):
-    cli.check_parameters(PARAMETERS, value)
+    arguments.check_parameters(PARAMETERS, value)
 
 
 @pytest.mark.parametrize(
@@ -90,6 +90,6 @@ def test_good_parameters(value):
     ],
 )
 def test_bad_parameters_name_what_would_do(value, words):
-    with pytest.raises(cli.ArgumentError) as caught:
-        cli.check_parameters(PARAMETERS, value)
+    with pytest.raises(arguments.ArgumentError) as caught:
+        arguments.check_parameters(PARAMETERS, value)
     assert all(word in str(caught.value) for word in words)

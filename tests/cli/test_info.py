@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from gi_engine import cli, headless, native
+from gi_engine import arguments, cli, headless, native
 from gi_engine.control import Progress
 from gi_engine.display import PlainDisplay, amount, details, duration
 
@@ -87,7 +87,7 @@ def test_the_readme_lists_the_integrators(root):
 
 def test_every_default_is_valid():
     for descriptor in native.integrators():
-        cli.check_parameters(descriptor, {p["name"]: str(p["default"]) for p in descriptor["parameters"]})
+        arguments.check_parameters(descriptor, {p["name"]: str(p["default"]) for p in descriptor["parameters"]})
 
 
 def test_inside_blender_the_open_file_is_rendered(stage, tmp_path):
