@@ -41,13 +41,13 @@ void white_noise(const Operands& a, ShadeState&) {
 }
 
 // voronoi(distance or radius, colour, position, w; vector, w, scale, detail, roughness, lacunarity, smoothness, exponent,
-//         randomness; dimensions, VoronoiFeature, VoronoiMetric, normalize)
+//         randomness; dimensions, VoronoiFeature, VoronoiMetric, normalize, float hash)
 void voronoi(const Operands& a, ShadeState&) {
   VoronoiSettings s;
   const float scale = a.f(6);
   s.detail = std::clamp(a.f(7), 0.0f, 15.0f), s.roughness = clamp01(a.f(8)), s.lacunarity = a.f(9);
   s.smoothness = std::clamp(a.f(10) * 0.5f, 0.0f, 0.5f), s.exponent = a.f(11), s.randomness = clamp01(a.f(12));
-  s.feature = VoronoiFeature(a.imm(14)), s.metric = VoronoiMetric(a.imm(15)), s.normalize = a.imm(16) != 0;
+  s.feature = VoronoiFeature(a.imm(14)), s.metric = VoronoiMetric(a.imm(15)), s.normalize = a.imm(16) != 0, s.float_hash = a.imm(17) != 0;
   with_dimensions(a.imm(13), [&]<int N>() {
     const VoronoiSample<N> v = voronoi_texture(coordinates<N>(a.v(4), a.f(5)) * scale, s);
     const Point<N> p = map(v.position, [scale](float x) { return safe_divide(x, scale); });
@@ -170,7 +170,7 @@ void preetham_texture(const Operands& a, ShadeState& s) {
 constexpr Op kTextureOps[] = {
     {"noise", "fv", "vffffffff", 4, OpKind::kPure, noise},
     {"white_noise", "fv", "vf", 1, OpKind::kPure, white_noise},
-    {"voronoi", "fvvf", "vffffffff", 4, OpKind::kPure, voronoi},
+    {"voronoi", "fvvf", "vffffffff", 5, OpKind::kPure, voronoi},
     {"gabor", "fff", "vffffv", 1, OpKind::kPure, gabor_texture},
     {"affine", "v", "vvvvv", 0, OpKind::kPure, affine},
     {"checker", "vf", "vvvf", 0, OpKind::kPure, checker_texture},

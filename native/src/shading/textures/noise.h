@@ -136,16 +136,11 @@ float ridged_multifractal(Point<N> p, const FractalSettings& s) {
 template <int N>
 float fractal_noise(Point<N> p, const FractalSettings& s) {
   switch (s.type) {
-    case Fractal::kMultifractal:
-      return multifractal(p, s);
-    case Fractal::kFbm:
-      return fbm(p, s);
-    case Fractal::kHybridMultifractal:
-      return hybrid_multifractal(p, s);
-    case Fractal::kRidgedMultifractal:
-      return ridged_multifractal(p, s);
-    case Fractal::kHeteroTerrain:
-      return hetero_terrain(p, s);
+    case Fractal::kMultifractal: return multifractal(p, s);
+    case Fractal::kFbm: return fbm(p, s);
+    case Fractal::kHybridMultifractal: return hybrid_multifractal(p, s);
+    case Fractal::kRidgedMultifractal: return ridged_multifractal(p, s);
+    case Fractal::kHeteroTerrain: return hetero_terrain(p, s);
   }
   return 0;
 }

@@ -59,14 +59,10 @@ Point<N> coordinates(Vec3 p, float w) {
 template <class F>
 void with_dimensions(int n, F f) {
   switch (n) {
-    case 1:
-      return f.template operator()<1>();
-    case 2:
-      return f.template operator()<2>();
-    case 4:
-      return f.template operator()<4>();
-    default:
-      return f.template operator()<3>();
+    case 1: return f.template operator()<1>();
+    case 2: return f.template operator()<2>();
+    case 4: return f.template operator()<4>();
+    default: return f.template operator()<3>();
   }
 }
 

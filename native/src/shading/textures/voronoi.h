@@ -12,6 +12,7 @@ struct VoronoiSettings {
   VoronoiFeature feature = VoronoiFeature::kF1;
   VoronoiMetric metric = VoronoiMetric::kEuclidean;
   bool normalize = false;
+  bool float_hash = false;  // as until Blender 4.5: cells are hashed as floats, not as integers
   float detail = 0, roughness = 0.5f, lacunarity = 2, smoothness = 0.5f, exponent = 0.5f, randomness = 1;
 };
 
@@ -46,45 +47,49 @@ struct Feature {
 };
 
 template <int N>
-Point<N> jitter(const Cell<N>& cell, const int (&offset)[N]) {
+Point<N> cell_key(const Cell<N>& cell, const int (&offset)[N]) {
+  Point<N> key;
+  for (int d = 0; d < N; ++d) key[d] = cell.floor[d] + float(offset[d]);
+  return key;
+}
+template <int N>
+Point<N> jitter(const Cell<N>& cell, const int (&offset)[N], bool float_hash) {
   if constexpr (N == 1) {
-    return {{hash01(cell.floor[0] + float(offset[0]))}};
+    return {{hash_value(cell_key(cell, offset))}};
   } else {
+    if (float_hash) return hash_point(cell_key(cell, offset));
     int32_t index[N];
     for (int d = 0; d < N; ++d) index[d] = int32_t(uint32_t(cell.index[d]) + uint32_t(offset[d]));
-    return hash_cell<N>(index);
+    return hash_cell(index);
   }
 }
 template <int N>
-Rgb cell_color(const Cell<N>& cell, const int (&offset)[N]) {
-  if constexpr (N == 1) {
-    return hash_rgb(Point<1>{{cell.floor[0] + float(offset[0])}});
-  } else {
-    int32_t index[N < 3 ? 3 : N] = {};
-    for (int d = 0; d < N; ++d) index[d] = int32_t(uint32_t(cell.index[d]) + uint32_t(offset[d]));
-    const auto h = hash_cell(index);
-    return {h[0], h[1], h[2]};
-  }
+Rgb cell_color(const Cell<N>& cell, const int (&offset)[N], bool float_hash) {
+  if (N == 1 || float_hash) return hash_rgb(cell_key(cell, offset));
+  int32_t index[N < 3 ? 3 : N] = {};  // two dimensions hash as three
+  for (int d = 0; d < N; ++d) index[d] = int32_t(uint32_t(cell.index[d]) + uint32_t(offset[d]));
+  const auto h = hash_cell(index);
+  return {h[0], h[1], h[2]};
 }
 
 // f(feature) for the cells at most `Reach` away from `middle`, in the order that ties are broken by.
 template <int Reach, int N, class F>
-void for_each_feature(const Cell<N>& cell, const int (&middle)[N], float randomness, F f) {
+void for_each_feature(const Cell<N>& cell, const int (&middle)[N], const VoronoiSettings& s, F f) {
   constexpr int kSide = 2 * Reach + 1;
   int count = 1;
   for (int d = 0; d < N; ++d) count *= kSide;
   for (int i = 0; i < count; ++i) {
     Feature<N> feature;
     for (int d = 0, rest = i; d < N; ++d, rest /= kSide) feature.offset[d] = rest % kSide - Reach + middle[d];
-    const Point<N> j = jitter(cell, feature.offset);
-    for (int d = 0; d < N; ++d) feature.point[d] = float(feature.offset[d]) + j[d] * randomness;
+    const Point<N> j = jitter(cell, feature.offset, s.float_hash);
+    for (int d = 0; d < N; ++d) feature.point[d] = float(feature.offset[d]) + j[d] * s.randomness;
     f(feature);
   }
 }
 template <int Reach, int N, class F>
-void for_each_feature(const Cell<N>& cell, float randomness, F f) {
+void for_each_feature(const Cell<N>& cell, const VoronoiSettings& s, F f) {
   const int middle[N] = {};
-  for_each_feature<Reach>(cell, middle, randomness, f);
+  for_each_feature<Reach>(cell, middle, s, f);
 }
 
 template <int N>
@@ -93,8 +98,7 @@ float distance(Point<N> a, Point<N> b, const VoronoiSettings& s) {
   if (N == 1) return d[0];
   float sum = 0, largest = 0;
   switch (s.metric) {
-    case VoronoiMetric::kEuclidean:
-      return std::sqrt(dot(d, d));
+    case VoronoiMetric::kEuclidean: return std::sqrt(dot(d, d));
     case VoronoiMetric::kManhattan:
       for (int i = 0; i < N; ++i) sum += d[i];
       return sum;
@@ -123,11 +127,11 @@ VoronoiSample<N> nearest(Point<N> p, const VoronoiSettings& s) {
   const Cell<N> cell(p);
   Feature<N> best{};
   float best_order = kInf;
-  for_each_feature<1>(cell, s.randomness, [&](const Feature<N>& f) {
+  for_each_feature<1>(cell, s, [&](const Feature<N>& f) {
     const float order = distance_order(f.point, cell.local, s);
     if (order < best_order) best_order = order, best = f;
   });
-  return {distance(best.point, cell.local, s), cell_color(cell, best.offset), best.point + cell.floor};
+  return {distance(best.point, cell.local, s), cell_color(cell, best.offset, s.float_hash), best.point + cell.floor};
 }
 
 template <int N>
@@ -135,7 +139,7 @@ VoronoiSample<N> second_nearest(Point<N> p, const VoronoiSettings& s) {
   const Cell<N> cell(p);
   Feature<N> first{}, second{};
   float d1 = kInf, d2 = kInf;
-  for_each_feature<1>(cell, s.randomness, [&](const Feature<N>& f) {
+  for_each_feature<1>(cell, s, [&](const Feature<N>& f) {
     const float d = distance_order(f.point, cell.local, s);
     if (d < d1) {
       d2 = d1, second = first;
@@ -144,7 +148,7 @@ VoronoiSample<N> second_nearest(Point<N> p, const VoronoiSettings& s) {
       d2 = d, second = f;
     }
   });
-  return {distance(second.point, cell.local, s), cell_color(cell, second.offset), second.point + cell.floor};
+  return {distance(second.point, cell.local, s), cell_color(cell, second.offset, s.float_hash), second.point + cell.floor};
 }
 
 // A minimum that blends where distances are within `smoothness` of each other; two cells far, or it would show seams.
@@ -153,13 +157,13 @@ VoronoiSample<N> smooth_nearest(Point<N> p, const VoronoiSettings& s) {
   const Cell<N> cell(p);
   VoronoiSample<N> sum;
   bool first = true;
-  for_each_feature<2>(cell, s.randomness, [&](const Feature<N>& f) {
+  for_each_feature<2>(cell, s, [&](const Feature<N>& f) {
     const float d = distance(f.point, cell.local, s);
     const float t = first ? 1.0f : clamp01(0.5f + 0.5f * (sum.distance - d) / s.smoothness), h = t * t * (3.0f - 2.0f * t);
     first = false;
     const float dip = s.smoothness * h * (1.0f - h), soft_dip = dip / (1.0f + 3.0f * s.smoothness);
     sum.distance = lerp(sum.distance, d, h) - dip;
-    sum.color = lerp(sum.color, cell_color(cell, f.offset), h) - Rgb(soft_dip);
+    sum.color = lerp(sum.color, cell_color(cell, f.offset, s.float_hash), h) - Rgb(soft_dip);
     sum.position = map(lerp(sum.position, f.point, h), [soft_dip](float x) { return x - soft_dip; });
   });
   sum.position = sum.position + cell.floor;
@@ -176,14 +180,14 @@ float distance_to_edge(Point<N> p, const VoronoiSettings& s) {
   } else {
     Point<N> closest;
     float best = kInf;
-    for_each_feature<1>(cell, s.randomness, [&](const Feature<N>& f) {
+    for_each_feature<1>(cell, s, [&](const Feature<N>& f) {
       const Point<N> v = f.point - cell.local;
       const float d = dot(v, v);
       if (d < best) best = d, closest = v;
     });
     // The edge to each other feature point is the plane half way to it.
     float edge = kInf;
-    for_each_feature<1>(cell, s.randomness, [&](const Feature<N>& f) {
+    for_each_feature<1>(cell, s, [&](const Feature<N>& f) {
       const Point<N> v = f.point - cell.local, across = v - closest;
       const float l2 = dot(across, across);
       if (l2 > 0.0001f) edge = std::min(edge, dot((v + closest) * 0.5f, across) / std::sqrt(l2));
@@ -198,12 +202,12 @@ float sphere_radius(Point<N> p, const VoronoiSettings& s) {
   const Cell<N> cell(p);
   Feature<N> closest{};
   float best = kInf;
-  for_each_feature<1>(cell, s.randomness, [&](const Feature<N>& f) {
+  for_each_feature<1>(cell, s, [&](const Feature<N>& f) {
     const float d = dot(f.point - cell.local, f.point - cell.local);
     if (d < best) best = d, closest = f;
   });
   best = kInf;
-  for_each_feature<1>(cell, closest.offset, s.randomness, [&](const Feature<N>& f) {
+  for_each_feature<1>(cell, closest.offset, s, [&](const Feature<N>& f) {
     bool same = true;
     for (int d = 0; d < N; ++d) same = same && f.offset[d] == closest.offset[d];
     if (!same) best = std::min(best, dot(f.point - closest.point, f.point - closest.point));
@@ -278,14 +282,9 @@ template <int N>
 VoronoiSample<N> voronoi_texture(Point<N> p, const VoronoiSettings& s) {
   VoronoiSample<N> result;
   switch (s.feature) {
-    case VoronoiFeature::kDistanceToEdge:
-      result.distance = detail::fractal_distance_to_edge(p, s);
-      break;
-    case VoronoiFeature::kNSphereRadius:
-      result.distance = detail::sphere_radius(p, s);
-      break;
-    default:
-      result = detail::fractal(p, s);
+    case VoronoiFeature::kDistanceToEdge: result.distance = detail::fractal_distance_to_edge(p, s); break;
+    case VoronoiFeature::kNSphereRadius: result.distance = detail::sphere_radius(p, s); break;
+    default: result = detail::fractal(p, s);
   }
   return result;
 }

@@ -37,12 +37,9 @@ inline float wave(Vec3 p, const WaveSettings& s) {
   }
   const float turns = n / (2.0f * kPi);
   switch (s.profile) {
-    case WaveProfile::kSine:
-      return 0.5f + 0.5f * std::sin(n - kPi / 2);
-    case WaveProfile::kSaw:
-      return turns - std::floor(turns);
-    case WaveProfile::kTriangle:
-      return std::abs(turns - std::floor(turns + 0.5f)) * 2.0f;
+    case WaveProfile::kSine: return 0.5f + 0.5f * std::sin(n - kPi / 2);
+    case WaveProfile::kSaw: return turns - std::floor(turns);
+    case WaveProfile::kTriangle: return std::abs(turns - std::floor(turns + 0.5f)) * 2.0f;
   }
   return 0;
 }
