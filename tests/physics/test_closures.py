@@ -101,6 +101,20 @@ def test_oren_nayar_is_reciprocal_and_tends_to_lambert(roughness):
     np.testing.assert_allclose(smooth, 1 / np.pi, rtol=1e-4)
 
 
+def test_diffuse_lobes_see_light_where_a_bumped_normal_turns_from_the_viewer():
+    """The cosine of the viewer counts as 0 then; what it multiplies elsewhere stays."""
+    rng = np.random.default_rng(4)
+    wo = chi2.directions(-rng.uniform(0.05, 0.9, 500), rng.uniform(0, 2 * np.pi, 500))
+    wi = chi2.directions(rng.uniform(0.05, 1, 500), rng.uniform(0, 2 * np.pi, 500))
+    a = 1 / (np.pi + np.pi / 2 - 2 / 3)
+    s = (wo * wi).sum(1)
+    expected = a * wi[:, 2] * (1 + np.where(s > 0, s / wi[:, 2], s))  # black: no light scattered more than once
+    black = _core.lobe_eval("oren_nayar", {"roughness": [1.0], "color": [0.0]}, wo, wi)[:, 0]
+    np.testing.assert_allclose(black, expected, rtol=1e-4, atol=1e-5)
+    toon = {"size": [0.6], "smooth": [0.1]}
+    np.testing.assert_array_equal(_core.lobe_eval("toon", toon, wo, wi), _core.lobe_eval("toon", toon, view(0.5), wi))
+
+
 @pytest.mark.parametrize(("cos_o", "roughness"), [(0.95, 1.0), (0.37, 0.52), (0.2, 0.31), (0.09, 0.24)])
 def test_sheen_reflects_what_a_layer_of_fibres_does(root, cos_o, roughness):
     """Off the table's grid, against a random walk through the fibres."""
