@@ -95,8 +95,8 @@ SCENES = {
 }
 
 
-def seconds(build, engine: str) -> float:
-    """Of one render's reading of the scene, in a new file."""
+def seconds(build, engine: str) -> tuple[float, float]:
+    """Wall and CPU time of one render's reading of the scene, in a new file."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -108,10 +108,10 @@ def seconds(build, engine: str) -> float:
     scene.render.resolution_x = scene.render.resolution_y = 4
     scene.cycles.samples, scene.cycles.use_denoising = 1, False
     bpy.context.view_layer.update()
-    told: list[tuple[float, str]] = []
+    told: list[tuple[str, float, float]] = []
 
     def listen(status):
-        told.append((time.perf_counter(), status))
+        told.append((status, time.perf_counter(), time.process_time()))
 
     bpy.app.handlers.render_stats.append(listen)
     try:
@@ -119,8 +119,9 @@ def seconds(build, engine: str) -> float:
     finally:
         bpy.app.handlers.render_stats.remove(listen)
     first, after = STAGES[engine]
-    start = next(at for at, status in told if first in status)
-    return next(at for at, status in told if at > start and after in status) - start
+    begin = next(i for i, (status, *_) in enumerate(told) if first in status)
+    end = next(i for i, (status, *_) in enumerate(told) if i > begin and after in status)
+    return told[end][1] - told[begin][1], told[end][2] - told[begin][2]
 
 
 def main() -> int:
@@ -129,16 +130,19 @@ def main() -> int:
     rounds = parser.parse_args().rounds
     gi_engine.register()
     print(f"Blender {bpy.app.version_string}, {os.cpu_count()} cores, medians of {rounds}")
-    print(f"{'':30}{'GI Engine':>12}{'Cycles':>12}{'Cycles/ours':>14}")
+    print(f"{'':30}{'GI Engine, wall (CPU)':>24}{'Cycles, wall (CPU)':>24}{'Cycles/ours':>14}")
     ratios = []
     for name, build in SCENES.items():
-        times: dict[str, list[float]] = {engine: [] for engine in STAGES}
+        times: dict[str, list[tuple[float, float]]] = {engine: [] for engine in STAGES}
         for i in range(rounds):
             for engine in sorted(STAGES, reverse=i % 2 == 1):
                 times[engine].append(seconds(build, engine))
-        ours, theirs = (statistics.median(times[engine]) for engine in ("GI_ENGINE", "CYCLES"))
-        ratios.append(theirs / ours)
-        print(f"{name:30}{ours * 1e3:9.1f} ms{theirs * 1e3:9.1f} ms{ratios[-1]:14.2f}", flush=True)
+        medians = [
+            [statistics.median(column) for column in zip(*times[e], strict=True)] for e in ("GI_ENGINE", "CYCLES")
+        ]
+        ratios.append(medians[1][0] / medians[0][0])
+        cells = "".join(f"{wall * 1e3:11.1f} ms ({cpu * 1e3:6.0f})" for wall, cpu in medians)
+        print(f"{name:30}{cells}{ratios[-1]:14.2f}", flush=True)
     return 0 if ratios[0] > 1 else 1
 
 

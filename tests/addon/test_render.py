@@ -178,6 +178,8 @@ def test_pixels_are_those_of_cycles(scene, rendered, camera):
     add(scene, "Bent", grid(8), scale=(3, 2, 4), location=(-1.5, -1, 0))
     for i in range(3):
         add(scene, f"Square {i}", mesh(), location=(i - 1, i - 1.5, 1), rotation_euler=(0.5, i, 0))
+    carrier = add(scene, "Carrier", grid(2), instance_type="VERTS", location=(-1, 0.5, 2), scale=(2, 1, 1))
+    add(scene, "Leaf", mesh(), scale=(0.2, 0.1, 1), rotation_euler=(0.3, 0, 0)).parent = carrier
     scene.render.resolution_x, scene.render.resolution_y = 96, 64
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "GAUSSIAN", 0.01
     scene.cycles.use_denoising = False
