@@ -27,16 +27,18 @@ def export_mesh(mesh, name: str, wanted: set[str], deformed: bool = False) -> Me
     if not deformed:
         wanted = wanted - {UNDEFORMED}  # slow to read, and no different from the positions
     active_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
+    attributes = list(read_attributes(mesh, wanted, active_uv))
+    by_face = material is not None or any(attribute.domain == "FACE" for attribute in attributes)
     return Mesh(
         name=name,
         positions=read_positions(mesh),
         corner_vert=read(mesh.attributes[".corner_vert"].data, "value", 1, np.int32),
         tri_corner=tri_corner,
-        tri_face=read(mesh.loop_triangle_polygons, "value", 1, np.int32),
+        tri_face=read(mesh.loop_triangle_polygons, "value", 1, np.int32) if by_face else None,
         face_material=read(material.data, "value", 1, np.int32) if material else None,
         normals_domain=domain,
         normals=normals,
-        attributes=list(read_attributes(mesh, wanted, active_uv)),
+        attributes=attributes,
         active_uv=active_uv,
         texture_space=(tuple(mesh.texspace_location), tuple(mesh.texspace_size)),
     )

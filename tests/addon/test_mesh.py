@@ -20,9 +20,12 @@ def check_geometry(data, exported) -> None:
     np.testing.assert_array_equal(exported.positions, [v.co[:] for v in data.vertices])
     triangles = [[data.loops[c].vertex_index for c in t.loops] for t in data.loop_triangles]
     np.testing.assert_array_equal(exported.corner_vert[exported.tri_corner], triangles)
+    slots = [p.material_index for p in data.polygons]
+    if not any(slots):
+        assert exported.face_material is None and exported.tri_face is None
+        return
     np.testing.assert_array_equal(exported.tri_face, [t.polygon_index for t in data.loop_triangles])
-    slots = exported.face_material if exported.face_material is not None else np.zeros(len(data.polygons))
-    np.testing.assert_array_equal(slots, [p.material_index for p in data.polygons])
+    np.testing.assert_array_equal(exported.face_material, slots)
 
 
 def test_geometry_of_a_mixed_mesh(scene):
@@ -33,6 +36,11 @@ def test_geometry_of_a_mixed_mesh(scene):
     item = add(scene, "Mixed", data)
     found = evaluated(item)
     check_geometry(found, export_mesh(found, "Mixed", set()))
+
+
+def test_geometry_without_materials(scene):
+    found = evaluated(add(scene, "Grid", grid(4)))
+    check_geometry(found, export_mesh(found, "Grid", set()))
 
 
 @pytest.mark.parametrize("smoothing", ["flat", "smooth", "sharp edge", "custom"])
