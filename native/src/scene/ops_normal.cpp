@@ -162,8 +162,8 @@ void tangent_radial(const Operands& o, ShadeState& s) {
 const Op kOps[] = {
     {"normal_map_tangent", "v", "vf", 2, OpKind::kContext, normal_map_tangent},
     {"normal_map_space", "v", "vf", 3, OpKind::kContext, normal_map_space},
-    {"bump_shift", "vvv", "f", 1, OpKind::kControl, bump_shift},
-    {"bump_restore", "", "vvv", 0, OpKind::kControl, bump_restore},
+    {"bump_shift", "vvv", "f", 1, OpKind::kShift, bump_shift},
+    {"bump_restore", "", "vvv", 0, OpKind::kRestore, bump_restore},
     {"bump", "v", "ffffffv", 1, OpKind::kContext, bump},
     {"set_normal", "", "v", 0, OpKind::kControl, set_normal},
     {"displacement", "v", "fffv", 1, OpKind::kContext, displacement},

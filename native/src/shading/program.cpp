@@ -5,53 +5,25 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "shading/instructions.h"
 #include "shading/resources.h"
 
 namespace gi {
-namespace {
-
-constexpr int kJump = 0;
-
-int width_of(char type) { return type == 'v' ? 3 : 1; }
-
-// Registers and jumps of one instruction, in the order of its operands.
-struct Instruction {
-  const Op& op;
-  const int32_t* operands;  // outputs, inputs, immediates
-  template <class F>
-  void for_outputs(F f) const {
-    for (int i = 0; op.outputs[i]; ++i) f(operands[i], width_of(op.outputs[i]));
-  }
-  template <class F>
-  void for_inputs(F f) const {
-    const int n = int(std::strlen(op.outputs));
-    for (int i = 0; op.inputs[i]; ++i) f(operands[n + i], width_of(op.inputs[i]));
-  }
-};
-
-template <class F>
-void for_each_instruction(const std::vector<int32_t>& code, F f) {
-  for (size_t at = 0; at < code.size();) {
-    const Op& op = ops()[size_t(code[at])];
-    f(at, Instruction{op, code.data() + at + 1});
-    at += size_t(op.width());
-  }
-}
-
-}  // namespace
 
 Program::Program(std::string name, std::vector<int32_t> code, std::vector<float> constants, int register_count, std::vector<float> tables)
     : name_(std::move(name)), code_(std::move(code)), constants_(std::move(constants)), register_count_(register_count), tables_(std::move(tables)) {
   check();
   fold_constants();
+  drop_all_but(kAddsLobe | kAddsEmission | kAddsTransparency);
   summarise();
-  if (effects_ & kAddsTransparency) transparency_ = std::make_shared<Program>(reduced_to(kAddsTransparency));
-  if (effects_ & kAddsEmission) emission_ = std::make_shared<Program>(reduced_to(kAddsEmission));
+  if (effects_ & kAddsTransparency) transparency_ = reduced_to(kAddsTransparency);
+  if (effects_ & kAddsEmission) emission_ = reduced_to(kAddsEmission);
+  pack_registers();
 }
 
 void Program::check() const {
   const std::string who = "the node program of '" + name_ + "': ";
-  require(register_count_ >= 0 && register_count_ <= kMaxRegisters, who + "needs " + std::to_string(register_count_) + " registers; the most is " + std::to_string(kMaxRegisters));
+  require(register_count_ >= 0 && register_count_ <= kMaxUnpacked, who + "needs " + std::to_string(register_count_) + " registers; the most is " + std::to_string(kMaxUnpacked));
   require(int(constants_.size()) <= register_count_, who + "has more constants than registers");
   std::vector<bool> starts(code_.size() + 1, false);
   std::vector<size_t> targets;
@@ -63,7 +35,7 @@ void Program::check() const {
     require(at + size_t(op.width()) <= code_.size(), where + "is cut off");
     const Instruction instruction{op, code_.data() + at + 1};
     const auto in_range = [&](int32_t slot, int width) {
-      require(slot >= 0 && slot + width <= register_count_, where + "uses register " + std::to_string(slot) + " of " + std::to_string(register_count_));
+      require(slot >= 0 && slot <= register_count_ - width, where + "uses register " + std::to_string(slot) + " of " + std::to_string(register_count_));
     };
     instruction.for_outputs([&](int32_t slot, int width) {
       in_range(slot, width);
@@ -83,16 +55,9 @@ void Program::check() const {
 }
 
 void Program::run(ShadingPoint& point, const ShaderResources& resources, Bsdf* bsdf) const {
-  float registers[kMaxRegisters];
+  float registers[kMaxRegisters + 2];
   std::copy(constants_.begin(), constants_.end(), registers);
   ShadeState state{point, resources, tables_.data(), bsdf};
-  run_code(registers, state);
-}
-
-void Program::run_registers(ShadingPoint& point, const ShaderResources& resources, float* registers) const {
-  std::fill_n(registers, register_count_, 0.0f);
-  std::copy(constants_.begin(), constants_.end(), registers);
-  ShadeState state{point, resources, tables_.data(), nullptr};
   run_code(registers, state);
 }
 
@@ -126,7 +91,17 @@ void Program::fold_constants() {
   std::fill_n(known.begin(), constants_.size(), true);
   std::vector<bool> folded(code_.size() + 1, false);
   bool any = false;
+  size_t skipped_until = 0;
   for_each_instruction(code_, [&](size_t at, const Instruction& i) {
+    if (at < skipped_until) {
+      folded[at] = true;
+      return;
+    }
+    if (code_[at] == kJump && known[size_t(code_[at + 1])]) {
+      if (values[size_t(code_[at + 1])] == 0.0f) skipped_until = size_t(code_[at + 2]);
+      folded[at] = any = true;
+      return;
+    }
     bool constant = i.op.kind == OpKind::kPure;
     i.for_inputs([&](int32_t slot, int width) {
       for (int k = 0; k < width; ++k) constant = constant && known[size_t(slot + k)];
@@ -150,14 +125,20 @@ void Program::fold_constants() {
 // Rebuilds the program from the instructions that `wanted` keeps, with all known registers moved to the front as constants.
 template <class Wanted>
 void Program::keep(const Wanted& wanted, const std::vector<float>& values, const std::vector<bool>& known) {
+  std::vector<bool> used(values.size(), false);
+  for_each_instruction(code_, [&](size_t at, const Instruction& i) {
+    if (!wanted(at, i)) return;
+    const auto use = [&](int32_t slot, int width) { std::fill_n(used.begin() + slot, width, true); };
+    i.for_outputs(use), i.for_inputs(use);
+  });
   // Renumber: known registers first. Values of width 3 stay together because all three are known or none is.
-  std::vector<int32_t> place(values.size());
+  std::vector<int32_t> place(values.size(), 0);
   std::vector<float> constants;
   int32_t next = 0;
   for (size_t r = 0; r < place.size(); ++r)
-    if (known[r]) place[r] = next++, constants.push_back(values[r]);
+    if (known[r] && used[r]) place[r] = next++, constants.push_back(values[r]);
   for (size_t r = 0; r < place.size(); ++r)
-    if (!known[r]) place[r] = next++;
+    if (!known[r] && used[r]) place[r] = next++;
 
   std::vector<int32_t> code;
   std::vector<int32_t> moved(code_.size() + 1);
@@ -175,6 +156,7 @@ void Program::keep(const Wanted& wanted, const std::vector<float>& values, const
   for (const size_t j : jumps) code[j + 2] = moved[size_t(code[j + 2])];
   code_ = std::move(code);
   constants_ = std::move(constants);
+  register_count_ = next;
 }
 
 void Program::summarise() {
@@ -187,33 +169,48 @@ void Program::summarise() {
   for (const Op& op : ops()) widths_.push_back(uint8_t(op.width()));
 }
 
-// Keeps the closures with one of `effects`, what they depend on, and all control: read backwards, an instruction is
-// needed if something later that is kept reads what it writes.
-Program Program::reduced_to(uint8_t effects) const {
+// Keeps the closures with one of `effects`, what they depend on, and control: read backwards, an instruction is needed if
+// something later that is kept reads what it writes.
+void Program::drop_all_but(uint8_t effects) {
   std::vector<size_t> order;
   for_each_instruction(code_, [&](size_t at, const Instruction&) { order.push_back(at); });
   std::vector<bool> needed(size_t(register_count_), false), kept(code_.size() + 1, false);
+  std::vector<size_t> restore(size_t(register_count_), 0);  // where a shifted point goes back, by what the shift saved
+  size_t next_kept = code_.size();
   for (size_t n = order.size(); n-- > 0;) {
-    const Op& op = ops()[size_t(code_[order[n]])];
-    const Instruction i{op, code_.data() + order[n] + 1};
+    const size_t at = order[n];
+    const Op& op = ops()[size_t(code_[at])];
+    const Instruction i{op, code_.data() + at + 1};
     bool keep_it = op.kind == OpKind::kControl || (op.kind == OpKind::kClosure && (op.effects & effects));
     i.for_outputs([&](int32_t slot, int width) {
       for (int k = 0; k < width; ++k) keep_it = keep_it || needed[size_t(slot + k)];
     });
+    if (code_[at] == kJump) keep_it = next_kept < size_t(code_[at + 2]);
+    if (op.kind == OpKind::kRestore) restore[size_t(i.operands[0])] = at;
+    if (op.kind == OpKind::kShift) {
+      const size_t back = restore[size_t(i.operands[0])];
+      keep_it = next_kept < back;
+      if (keep_it) kept[back] = true;
+    }
     if (!keep_it) continue;
-    kept[order[n]] = true;
+    kept[at] = true, next_kept = at;
     i.for_inputs([&](int32_t slot, int width) {
       for (int k = 0; k < width; ++k) needed[size_t(slot + k)] = true;
     });
   }
-  Program reduced = *this;
-  reduced.transparency_.reset(), reduced.emission_.reset();
   std::vector<bool> known(size_t(register_count_), false);
   std::fill_n(known.begin(), constants_.size(), true);
   std::vector<float> values(size_t(register_count_), 0.0f);
   std::copy(constants_.begin(), constants_.end(), values.begin());
-  reduced.keep([&](size_t at, const Instruction&) { return bool(kept[at]); }, values, known);
-  reduced.summarise();
+  keep([&](size_t at, const Instruction&) { return bool(kept[at]); }, values, known);
+}
+
+std::shared_ptr<Program> Program::reduced_to(uint8_t effects) const {
+  auto reduced = std::make_shared<Program>(*this);
+  reduced->transparency_.reset(), reduced->emission_.reset();
+  reduced->drop_all_but(effects);
+  reduced->summarise();
+  reduced->pack_registers();
   return reduced;
 }
 

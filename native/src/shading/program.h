@@ -51,7 +51,9 @@ enum class OpKind : uint8_t {
   kPure,     // depends on its inputs alone: folded where they are constant
   kContext,  // reads the shading point, images or tables
   kClosure,  // adds a lobe, emission or transparency: kept by what it adds
-  kControl,  // jump_if_zero, bump shifts: never folded or dropped on their own
+  kControl,  // jump_if_zero, set_normal: what comes after depends on it
+  kShift,    // moves the point, and gives what kRestore needs to move it back: kept if something in between is
+  kRestore,
 };
 // What a closure op adds, for the programs specialised to one question.
 enum ClosureEffect : uint8_t { kAddsLobe = 1, kAddsEmission = 2, kAddsTransparency = 4 };
@@ -75,14 +77,14 @@ std::span<const Op> ops();
 class Program {
  public:
   Program() = default;
-  // Checks every op, register and jump; folds constants. Throws InputError naming `name` (the material).
+  // Checks every op, register and jump, folds constants, drops what adds to nothing and packs registers. Throws InputError
+  // naming `name` (the material).
   Program(std::string name, std::vector<int32_t> code, std::vector<float> constants, int register_count, std::vector<float> tables);
 
-  static constexpr int kMaxRegisters = 4096;
+  static constexpr int kMaxRegisters = 4096;       // after packing
+  static constexpr int kMaxUnpacked = 1 << 20;
 
   void run(ShadingPoint& point, const ShaderResources& resources, Bsdf* bsdf) const;
-  // Runs without closures and leaves every register in `registers` (register_count floats): for tests and tables.
-  void run_registers(ShadingPoint& point, const ShaderResources& resources, float* registers) const;
   int register_count() const { return register_count_; }
   // The part of the program that decides transparency (shadow rays), or emission (light sampling).
   const Program& transparency_program() const { return *transparency_; }
@@ -100,9 +102,11 @@ class Program {
   void fold_constants();
   template <class Wanted>
   void keep(const Wanted& wanted, const std::vector<float>& values, const std::vector<bool>& known);
+  void drop_all_but(uint8_t effects);
+  void pack_registers();
   void summarise();
   void run_code(float* registers, ShadeState& state) const;
-  Program reduced_to(uint8_t effects) const;
+  std::shared_ptr<Program> reduced_to(uint8_t effects) const;
 
   std::string name_;
   std::vector<int32_t> code_;
