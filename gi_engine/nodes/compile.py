@@ -216,13 +216,11 @@ class TreeWalker:
     def value(self, context: Context, socket, kind: str | None = None) -> Value:
         """The value that arrives at an input socket, converted to `kind`, by default the socket's own."""
         source = self.resolve(context, socket)
-        if source.node is None:
-            value = self.default(source.socket)
-        else:
-            value = self.output_of(source)
-        for passed in (*reversed(source.through), kind or kind_of(socket)):
-            value = self.builder.as_kind(value, passed)
-        return value
+        value = self.default(source.socket) if source.node is None else self.output_of(source)
+        if source.node is None or not is_inlined(self.owner):
+            for passed in reversed(source.through):
+                value = self.builder.as_kind(value, passed)
+        return self.builder.as_kind(value, kind or kind_of(socket))
 
     def output_of(self, source: Source) -> Value:
         """What the output socket of a source gives, as the kind of that socket."""
@@ -402,9 +400,14 @@ class NodeBuilder:
             self.op("set_normal", self.op("bump", *heights, 1.0, 1.0, width, self.op("normal"), imm=(True,)))
 
 
+def is_inlined(owner) -> bool:
+    """From Blender 5.0 on renderers get trees without groups, where links lead from node to node: values that come out of
+    nodes are not converted at the borders of groups. Materials and worlds always have their nodes in use, too."""
+    return hasattr(owner, "inline_shader_nodes")
+
+
 def has_nodes(owner) -> bool:
-    """From Blender 5.0 on all materials and worlds have their nodes in use."""
-    return owner.node_tree is not None and (hasattr(owner, "inline_shader_nodes") or owner.use_nodes)
+    return owner.node_tree is not None and (is_inlined(owner) or owner.use_nodes)
 
 
 @contextmanager

@@ -55,9 +55,9 @@ def test_nested_groups(stage):
 @pytest.mark.parametrize("kind", ["NodeSocketFloat", "NodeSocketVector", "NodeSocketColor"])
 @pytest.mark.parametrize("linked", [False, True])
 def test_group_sockets_convert(stage, kind, linked):
-    """What passes a group's socket becomes what the socket is: a colour, say, one number by luminance."""
+    """A value at a group's socket is what the socket is: a colour, say, becomes one number by luminance."""
     tree, inside, out = group("convert", [("x", kind)], [("y", "NodeSocketFloat")])
-    tree.links.new(inside.outputs[0], out.inputs[0])
+    tree.links.new(add(tree, inside.outputs[0], 0.1), out.inputs[0])
     node = stage.new("ShaderNodeGroup", node_tree=tree)
     node.inputs[0].default_value = {"NodeSocketFloat": 0.3, "NodeSocketVector": (0.1, 0.2, 0.9), "NodeSocketColor": (0.1, 0.2, 0.9, 1)}[kind]
     if linked:
