@@ -167,35 +167,39 @@ class TreeWalker:
     def resolve(self, context: Context, socket) -> Source:
         """Goes back through reroutes, muted nodes and group borders to what feeds an input socket."""
         through: list[str] = []
+        unlinked = Source(context, None, socket)  # whose own value counts if the way ends here
         while True:
             link = self.live_link(context, socket)
             if link is None:
-                return Source(context, None, socket, tuple(through))
+                return unlinked
             node, output = link.from_node, link.from_socket
+            stays = is_inlined(self.owner)  # reroutes and muted nodes that nothing is linked to are then as if not there
             if node.type == "REROUTE":
                 socket = node.inputs[0]
             elif node.mute:
                 inner = next((i for i in node.internal_links if i.to_socket == output), None)
                 if inner is None:
-                    return Source(context, None, socket, tuple(through))
+                    return unlinked
                 through += [kind_of(output), kind_of(inner.from_socket)]
                 socket = inner.from_socket
             elif node.type in {"GROUP", "CUSTOM GROUP"}:
                 inside = group_output(node)
                 if inside is None:
                     self.compiler.warn(f"{self.who}: node group '{node.name}' has no output; it gives its default")
-                    return Source(context, None, socket, tuple(through))
+                    return unlinked
                 through.append(kind_of(output))
                 context = Context(node.node_tree, node, context)
-                socket = by_identifier(inside.inputs, output.identifier)
+                socket, stays = by_identifier(inside.inputs, output.identifier), False
             elif node.type == "GROUP_INPUT":
                 if context.parent is None:
-                    return Source(context, None, socket, tuple(through))
+                    return unlinked
                 through.append(kind_of(output))
-                socket = by_identifier(context.group.inputs, output.identifier)
+                socket, stays = by_identifier(context.group.inputs, output.identifier), False
                 context = context.parent
             else:
                 return Source(context, node, output, tuple(through))
+            if not stays:
+                unlinked = Source(context, None, socket, tuple(through))
 
     def live_link(self, context: Context, socket):
         if socket is None or not socket.is_linked:
