@@ -173,7 +173,9 @@ class TreeWalker:
             if link is None:
                 return unlinked
             node, output = link.from_node, link.from_socket
-            stays = is_inlined(self.owner)  # reroutes and muted nodes that nothing is linked to are then as if not there
+            stays = is_inlined(
+                self.owner
+            )  # reroutes and muted nodes that nothing is linked to are then as if not there
             if node.type == "REROUTE":
                 socket = node.inputs[0]
             elif node.mute:

@@ -101,7 +101,9 @@ class Stage:
         assert np.isfinite(ours).all()
         size = np.maximum(1.0, np.abs(cycles))
         wrong = (np.abs(ours - cycles) > tolerance * size + 0.02 * change_over_pixel(cycles)).any(-1)
-        assert wrong.mean() <= outliers, f"{wrong.mean():.1%} of the pixels differ, by up to {np.abs(ours - cycles).max():.3g}"
+        assert wrong.mean() <= outliers, (
+            f"{wrong.mean():.1%} of the pixels differ, by up to {np.abs(ours - cycles).max():.3g}"
+        )
         return ours
 
 

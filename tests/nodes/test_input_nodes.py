@@ -1,6 +1,5 @@
 """Nodes that ask about the point, its object and its path, against Cycles."""
 
-import bpy
 import pytest
 
 OUTPUTS = {

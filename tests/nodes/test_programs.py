@@ -104,7 +104,15 @@ def test_skipped_and_taken_branches():
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.lists(st.tuples(st.sampled_from(["math_add", "math_multiply", "math_maximum"]), st.integers(0, 30), st.integers(0, 30)), min_size=1, max_size=60))
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["math_add", "math_multiply", "math_maximum"]), st.integers(0, 30), st.integers(0, 30)
+        ),
+        min_size=1,
+        max_size=60,
+    )
+)
 def test_folding_and_packing_change_nothing(steps):
     """The same sums from a constant (folded away) and from the point (computed, in shared registers)."""
 
@@ -112,7 +120,9 @@ def test_folding_and_packing_change_nothing(steps):
         def run_steps(builder):
             values = [start(builder), builder.constant(0.5)]
             for name, a, b in steps:
-                values.append(builder.op("saturate", builder.op(name, values[a % len(values)], values[b % len(values)])))
+                values.append(
+                    builder.op("saturate", builder.op(name, values[a % len(values)], values[b % len(values)]))
+                )
             return builder.op("combine", values[-1], values[len(values) // 2], values[0])
 
         return run_steps

@@ -59,7 +59,11 @@ def test_group_sockets_convert(stage, kind, linked):
     tree, inside, out = group("convert", [("x", kind)], [("y", "NodeSocketFloat")])
     tree.links.new(add(tree, inside.outputs[0], 0.1), out.inputs[0])
     node = stage.new("ShaderNodeGroup", node_tree=tree)
-    node.inputs[0].default_value = {"NodeSocketFloat": 0.3, "NodeSocketVector": (0.1, 0.2, 0.9), "NodeSocketColor": (0.1, 0.2, 0.9, 1)}[kind]
+    node.inputs[0].default_value = {
+        "NodeSocketFloat": 0.3,
+        "NodeSocketVector": (0.1, 0.2, 0.9),
+        "NodeSocketColor": (0.1, 0.2, 0.9, 1),
+    }[kind]
     if linked:
         stage.link(stage.new("ShaderNodeTexCoord").outputs["Generated"], node.inputs[0])
     stage.show(node.outputs[0])
@@ -100,7 +104,9 @@ def test_dangling_reroute(stage):
     stage.check()
 
 
-@pytest.mark.parametrize("idname", ["ShaderNodeMath", "ShaderNodeMix", "ShaderNodeSeparateXYZ", "ShaderNodeValToRGB", "ShaderNodeFresnel"])
+@pytest.mark.parametrize(
+    "idname", ["ShaderNodeMath", "ShaderNodeMix", "ShaderNodeSeparateXYZ", "ShaderNodeValToRGB", "ShaderNodeFresnel"]
+)
 def test_muted_node(stage, idname):
     node = stage.new(idname)
     if node.inputs[0].enabled:
@@ -129,7 +135,9 @@ def test_cycle(stage):
     assert "Under test" in warning and "Math" in warning and "cycle" in warning
 
 
-@pytest.mark.parametrize("idname", ["ShaderNodeScript", "ShaderNodeAmbientOcclusion", "ShaderNodeBevel", "ShaderNodeParticleInfo"])
+@pytest.mark.parametrize(
+    "idname", ["ShaderNodeScript", "ShaderNodeAmbientOcclusion", "ShaderNodeBevel", "ShaderNodeParticleInfo"]
+)
 def test_fallback_warns_once(stage, idname):
     node = stage.new(idname)
     node.name = "Odd one"

@@ -27,7 +27,9 @@ def numbers(stage, **how):
     return node.outputs
 
 
-@pytest.mark.parametrize(("operation", "clamp"), [(o, False) for o in items("ShaderNodeMath", "operation")] + [("TANGENT", True)])
+@pytest.mark.parametrize(
+    ("operation", "clamp"), [(o, False) for o in items("ShaderNodeMath", "operation")] + [("TANGENT", True)]
+)
 def test_math(stage, operation, clamp):
     node = stage.new("ShaderNodeMath", operation=operation, use_clamp=clamp)
     for output, target in zip(numbers(stage), node.inputs, strict=True):
@@ -40,7 +42,9 @@ def test_math(stage, operation, clamp):
 def test_vector_math(stage, operation):
     node = stage.new("ShaderNodeVectorMath", operation=operation)
     stage.link(spread(stage), node.inputs[0])
-    stage.link(spread(stage, scale=(0.5, -0.4, 0.3), offset=(0.4, -0.5, 0.6)), node.inputs[1])  # away from 0: fewer jumps
+    stage.link(
+        spread(stage, scale=(0.5, -0.4, 0.3), offset=(0.4, -0.5, 0.6)), node.inputs[1]
+    )  # away from 0: fewer jumps
     stage.link(stage.new("ShaderNodeTexCoord").outputs["UV"], node.inputs[2])
     stage.link(numbers(stage, offset=(0.2, 0.2, 0.2))[0], socket(node, "Scale"))
     stage.show(next(o for o in node.outputs if o.enabled))
@@ -129,7 +133,9 @@ def test_color_nodes(stage, idname):
     stage.check()
 
 
-@pytest.mark.parametrize(("idname", "scale", "offset"), [("ShaderNodeBlackbody", 12500.0, 300.0), ("ShaderNodeWavelength", 420.0, 370.0)])
+@pytest.mark.parametrize(
+    ("idname", "scale", "offset"), [("ShaderNodeBlackbody", 12500.0, 300.0), ("ShaderNodeWavelength", 420.0, 370.0)]
+)
 def test_spectra(stage, idname, scale, offset):
     node = stage.new(idname)
     stage.link(numbers(stage, scale=(scale,) * 3, offset=(offset,) * 3)[0], node.inputs[0])
@@ -202,7 +208,12 @@ def test_mapping(stage, kind):
 @pytest.mark.parametrize("kind", items("ShaderNodeVectorRotate", "rotation_type"))
 def test_vector_rotate(stage, kind, invert):
     node = stage.new("ShaderNodeVectorRotate", rotation_type=kind, invert=invert)
-    for name, value in {"Center": (0.1, 0.2, -0.3), "Axis": (0.5, 2.0, 1.0), "Angle": 0.9, "Rotation": (0.4, 1.1, -0.7)}.items():
+    for name, value in {
+        "Center": (0.1, 0.2, -0.3),
+        "Axis": (0.5, 2.0, 1.0),
+        "Angle": 0.9,
+        "Rotation": (0.4, 1.1, -0.7),
+    }.items():
         socket(node, name).default_value = value
     stage.link(spread(stage), node.inputs["Vector"])
     stage.show(node.outputs[0])

@@ -14,9 +14,7 @@ Vec3 map_color(const Operands& o, int i, bool invert_green) {
   return {c.x, invert_green ? -c.y : c.y, c.z};
 }
 
-void set_or_keep(const Operands& o, const ShadeState& s, Vec3 n) {
-  o.set(0, n == Vec3{} || !is_finite(n) ? s.point.ns : n);
-}
+void set_or_keep(const Operands& o, const ShadeState& s, Vec3 n) { o.set(0, n == Vec3{} || !is_finite(n) ? s.point.ns : n); }
 
 // colour, strength; UV slot, green goes down. The frame is that of the UV map, about the interpolated normal.
 void normal_map_tangent(const Operands& o, ShadeState& s) {
@@ -59,7 +57,8 @@ Steps pixel_steps(const ShadeState& s) {
   const ShadingPoint& p = s.point;
   if (!(p.dpdx == Vec3{})) return {p.dpdx * 2.0f, p.dpdy * 2.0f};  // the footprint is a radius
   const Frame frame = Frame::from_normal(p.ng);
-  const float step = s.resources.scene && !s.resources.scene->bounds().empty() ? kDefaultStep * length(s.resources.scene->bounds().extent()) : kDefaultStep;
+  const float step = s.resources.scene && !s.resources.scene->bounds().empty() ? kDefaultStep * length(s.resources.scene->bounds().extent())
+                                                                               : kDefaultStep;
   return {frame.x * step, frame.y * step};
 }
 
@@ -135,7 +134,8 @@ void vector_displacement(const Operands& o, ShadeState& s) {
     Vec3 du, dv;
     const Vec3 n = normal_to_object(s, s.point.ns);
     if (!s.resources.scene->uv_tangents(s.point, o.imm(4), du, dv)) du = Frame::from_normal(n).x, dv = Frame::from_normal(n).y;
-    const Vec3 t = normalize(i->to_object.vector(du)), b = normalize(cross(n, t)) * (dot(cross(n, t), i->to_object.vector(dv)) < 0.0f ? -1.0f : 1.0f);
+    const Vec3 t = normalize(i->to_object.vector(du)),
+               b = normalize(cross(n, t)) * (dot(cross(n, t), i->to_object.vector(dv)) < 0.0f ? -1.0f : 1.0f);
     d = t * d.x + n * d.y + b * d.z;
   }
   o.set(0, i->to_world.vector(d));

@@ -118,7 +118,8 @@ void curves(const Operands& o, ShadeState& s) {
   const Vec3 x = o.v(2);
   const float lo = float_of_bits(o.imm(6)), hi = float_of_bits(o.imm(7)), t = o.f(1);
   Vec3 y;
-  for (int i = 0; i < 3; ++i) y[i] = mix(x[i], curve_lookup(s.tables + o.imm(3) + i, o.imm(4), 3, (x[i] - lo) / (hi - lo), o.imm(5) != 0), t);
+  for (int i = 0; i < 3; ++i)
+    y[i] = mix(x[i], curve_lookup(s.tables + o.imm(3) + i, o.imm(4), 3, (x[i] - lo) / (hi - lo), o.imm(5) != 0), t);
   o.set(0, y);
 }
 

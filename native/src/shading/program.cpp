@@ -11,7 +11,11 @@
 namespace gi {
 
 Program::Program(std::string name, std::vector<int32_t> code, std::vector<float> constants, int register_count, std::vector<float> tables)
-    : name_(std::move(name)), code_(std::move(code)), constants_(std::move(constants)), register_count_(register_count), tables_(std::move(tables)) {
+    : name_(std::move(name)),
+      code_(std::move(code)),
+      constants_(std::move(constants)),
+      register_count_(register_count),
+      tables_(std::move(tables)) {
   check();
   fold_constants();
   drop_all_but(kAddsLobe | kAddsEmission | kAddsTransparency);
@@ -23,7 +27,8 @@ Program::Program(std::string name, std::vector<int32_t> code, std::vector<float>
 
 void Program::check() const {
   const std::string who = "the node program of '" + name_ + "': ";
-  require(register_count_ >= 0 && register_count_ <= kMaxUnpacked, who + "needs " + std::to_string(register_count_) + " registers; the most is " + std::to_string(kMaxUnpacked));
+  require(register_count_ >= 0 && register_count_ <= kMaxUnpacked,
+          who + "needs " + std::to_string(register_count_) + " registers; the most is " + std::to_string(kMaxUnpacked));
   require(int(constants_.size()) <= register_count_, who + "has more constants than registers");
   std::vector<bool> starts(code_.size() + 1, false);
   std::vector<size_t> targets;
@@ -35,14 +40,16 @@ void Program::check() const {
     require(at + size_t(op.width()) <= code_.size(), where + "is cut off");
     const Instruction instruction{op, code_.data() + at + 1};
     const auto in_range = [&](int32_t slot, int width) {
-      require(slot >= 0 && slot <= register_count_ - width, where + "uses register " + std::to_string(slot) + " of " + std::to_string(register_count_));
+      require(slot >= 0 && slot <= register_count_ - width,
+              where + "uses register " + std::to_string(slot) + " of " + std::to_string(register_count_));
     };
     instruction.for_outputs([&](int32_t slot, int width) {
       in_range(slot, width);
       require(size_t(slot) >= constants_.size(), where + "writes into a constant");
     });
     instruction.for_inputs(in_range);
-    require(!op.accepts || op.accepts(code_.data() + at + op.width() - op.immediates, tables_.size()), where + "refers to a table that is not there");
+    require(!op.accepts || op.accepts(code_.data() + at + op.width() - op.immediates, tables_.size()),
+            where + "refers to a table that is not there");
     if (code_[at] == kJump) {
       const int32_t target = code_[at + 2];
       require(target > int32_t(at) && size_t(target) <= code_.size(), where + "does not jump forwards");
