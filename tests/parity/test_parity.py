@@ -18,11 +18,7 @@ def parameters():
 @pytest.mark.parametrize(("case", "index"), parameters())
 def test_agrees_with_cycles(case, index):
     try:
-        pairs = suite.rendered(case.name)
+        found = suite.confirmed(case, index)
     except suite.Unavailable as error:
         pytest.skip(f"this Blender has no {error}")
-    if case.tiles:
-        found = suite.tile_agreement(case, pairs, index)
-    else:
-        (found,) = suite.agreements(case.name)
     assert found.agrees, str(found)
