@@ -114,7 +114,16 @@ def coffee_table(wood, china, clear, brass):
     for x in (2.52, 3.53):
         for y in (2.02, 2.48):
             box("table leg", (x, y, 0), (x + 0.05, y + 0.05, 0.38), wood)
-    bowl = [(0.0, 0.0), (0.06, 0.0), (0.07, 0.01), (0.15, 0.07), (0.17, 0.11), (0.163, 0.11), (0.14, 0.075), (0.0, 0.02)]
+    bowl = [
+        (0.0, 0.0),
+        (0.06, 0.0),
+        (0.07, 0.01),
+        (0.15, 0.07),
+        (0.17, 0.11),
+        (0.163, 0.11),
+        (0.14, 0.075),
+        (0.0, 0.02),
+    ]
     lathe("bowl", bowl, china, (2.8, 2.3, 0.4205))
     for x, y, r in ((2.75, 2.29, 0.042), (2.84, 2.26, 0.04), (2.81, 2.36, 0.041)):
         sphere("orange", (x, y, 0.50), r, principled("orange", (0.85, 0.32, 0.04), 0.45), 48)
@@ -159,7 +168,12 @@ def pictures(frame, reflecting):
     box("picture frame", (4.94, 1.2, 1.1), (4.995, 2.4, 1.9), frame, bevel=0.01)
     paint = striped("painting", (0.75, 0.55, 0.30), (0.12, 0.20, 0.28), 1.6)
     box("painting", (4.935, 1.26, 1.16), (4.945, 2.34, 1.84), paint)
-    lathe("mirror rim", [(0.29, 0.0), (0.33, 0.0), (0.33, 0.03), (0.29, 0.03), (0.29, 0.0)], frame, (1.35, DEPTH - 0.005, 1.6))
+    lathe(
+        "mirror rim",
+        [(0.29, 0.0), (0.33, 0.0), (0.33, 0.03), (0.29, 0.03), (0.29, 0.0)],
+        frame,
+        (1.35, DEPTH - 0.005, 1.6),
+    )
     bpy.data.objects["mirror rim"].rotation_euler.x = math.pi / 2
     lathe("mirror", [(0.29, 0.012), (0.0, 0.012)], reflecting, (1.35, DEPTH - 0.005, 1.6))
     bpy.data.objects["mirror"].rotation_euler.x = math.pi / 2
@@ -188,14 +202,25 @@ room(plaster, wood_floor())
 window_frames(white_paint)
 box("skirting", (0, DEPTH - 0.015, 0), (WIDTH, DEPTH, 0.09), white_paint, bevel=0.003)
 sofa(principled("sofa cloth", (0.16, 0.24, 0.26), 0.9, Sheen_Weight=0.4), diffuse("cushion", (0.62, 0.36, 0.12)), oak)
-box("rug", (1.9, 1.3, 0.0), (4.2, 3.05, 0.012), striped("rug", (0.62, 0.55, 0.46), (0.38, 0.16, 0.12), 2.2), bevel=0.004)
+box(
+    "rug", (1.9, 1.3, 0.0), (4.2, 3.05, 0.012), striped("rug", (0.62, 0.55, 0.46), (0.38, 0.16, 0.12), 2.2), bevel=0.004
+)
 coffee_table(oak, principled("china", (0.75, 0.78, 0.80), 0.1, Coat_Weight=0.5), glass("clear glass"), brass)
 shelf_of_books(oak)
 floor_lamp(brass, material("paper", "ShaderNodeBsdfTranslucent", Color=(0.85, 0.75, 0.6)))
 pictures(oak, mirror("mirror"))
-lathe("pot", [(0.0, 0.0), (0.14, 0.0), (0.19, 0.3), (0.17, 0.3), (0.0, 0.26)], principled("clay", (0.55, 0.25, 0.15), 0.7), (0.45, 3.8, 0))
+lathe(
+    "pot",
+    [(0.0, 0.0), (0.14, 0.0), (0.19, 0.3), (0.17, 0.3), (0.0, 0.26)],
+    principled("clay", (0.55, 0.25, 0.15), 0.7),
+    (0.45, 3.8, 0),
+)
 for i in range(14):
-    leaf = quad("leaf", [(0, 0, 0), (0.05, 0.22, 0.03), (0, 0.5, -0.03), (-0.05, 0.22, 0.03)], principled("leaf", (0.06, 0.22, 0.05), 0.4))
+    leaf = quad(
+        "leaf",
+        [(0, 0, 0), (0.05, 0.22, 0.03), (0, 0.5, -0.03), (-0.05, 0.22, 0.03)],
+        principled("leaf", (0.06, 0.22, 0.05), 0.4),
+    )
     leaf.location, leaf.rotation_euler = (0.45, 3.8, 0.25), (0.55 + 0.065 * (i % 9), 0.0, i * 2.4)
 daylight()
 camera((2.35, 0.15, 1.45), (2.65, 4.2, 0.95), lens=21.0)

@@ -41,7 +41,9 @@ def under(name, make_world):
 
 
 def background(tree, color, strength=1.0):
-    output(tree, node(tree, "ShaderNodeBackground", None, {"Color": color, "Strength": strength}), "ShaderNodeOutputWorld")
+    output(
+        tree, node(tree, "ShaderNodeBackground", None, {"Color": color, "Strength": strength}), "ShaderNodeOutputWorld"
+    )
 
 
 def gradient_world(tree):
@@ -168,7 +170,16 @@ CASES = [
     lit("area, ellipse", "AREA", shape="ELLIPSE", size=0.8, size_y=0.3),
     lit("area, spread", "AREA", shape="RECTANGLE", size=0.8, size_y=0.5, spread=1.0),
     lit("area, stretched", "AREA", stretched, shape="SQUARE", size=0.5),
-    lit("area, seen", "AREA", shape="SQUARE", size=0.5, location=(-0.2, 0.4, 0.9), rotation=(0.9, 0, 0), energy=8.0, visible=True),
+    lit(
+        "area, seen",
+        "AREA",
+        shape="SQUARE",
+        size=0.5,
+        location=(-0.2, 0.4, 0.9),
+        rotation=(0.9, 0, 0),
+        energy=8.0,
+        visible=True,
+    ),
     lit("sun", "SUN", energy=3.0, angle=0.0, rotation=(0.5, 0.3, 0)),
     lit("sun, angle", "SUN", energy=3.0, angle=0.2, rotation=(0.5, 0.3, 0)),
     lit("lamp of weak diffuse", "POINT", shadow_soft_size=0.1, diffuse_factor=0.3, specular_factor=0.6),

@@ -35,7 +35,9 @@ def emitting(name, build):
     made = bpy.data.materials.new(name)
     tree = tree_of(made)
     value = build(tree, sources(tree))
-    lifted = node(tree, "ShaderNodeVectorMath", {"operation": "MULTIPLY_ADD"}, {0: value, 1: (0.5,) * 3, 2: (0.25,) * 3})
+    lifted = node(
+        tree, "ShaderNodeVectorMath", {"operation": "MULTIPLY_ADD"}, {0: value, 1: (0.5,) * 3, 2: (0.25,) * 3}
+    )
     output(tree, node(tree, "ShaderNodeEmission", None, {"Color": lifted.outputs[0], "Strength": 1.0}))
     return made
 
@@ -104,13 +106,30 @@ VECTORS = {
     **{f"vector {op.lower()}": vector_math_tile(op) for op in VECTOR_MATH},
     "vector curves": of("ShaderNodeVectorCurve", after=curve, s1="P"),
     "mapping point": of("ShaderNodeMapping", None, s0="P", s1=(0.1, 0.2, 0.3), s2=(0.3, 0.4, 0.5), s3=(1.5, 0.5, 2.0)),
-    "mapping texture": of("ShaderNodeMapping", {"vector_type": "TEXTURE"}, s0="P", s1=(0.1, 0.2, 0.3), s2=(0.3, 0.4, 0.5), s3=(1.5, 0.5, 2.0)),
-    "mapping vector": of("ShaderNodeMapping", {"vector_type": "VECTOR"}, s0="P", s2=(0.3, 0.4, 0.5), s3=(1.5, 0.5, 2.0)),
-    "mapping normal": of("ShaderNodeMapping", {"vector_type": "NORMAL"}, s0="P", s2=(0.3, 0.4, 0.5), s3=(1.5, 0.5, 2.0)),
-    "rotate axis": of("ShaderNodeVectorRotate", None, Vector="P", Center=(0.3, 0.2, 0.1), Axis=(0.3, 0.5, 1.0), Angle=0.8),
+    "mapping texture": of(
+        "ShaderNodeMapping",
+        {"vector_type": "TEXTURE"},
+        s0="P",
+        s1=(0.1, 0.2, 0.3),
+        s2=(0.3, 0.4, 0.5),
+        s3=(1.5, 0.5, 2.0),
+    ),
+    "mapping vector": of(
+        "ShaderNodeMapping", {"vector_type": "VECTOR"}, s0="P", s2=(0.3, 0.4, 0.5), s3=(1.5, 0.5, 2.0)
+    ),
+    "mapping normal": of(
+        "ShaderNodeMapping", {"vector_type": "NORMAL"}, s0="P", s2=(0.3, 0.4, 0.5), s3=(1.5, 0.5, 2.0)
+    ),
+    "rotate axis": of(
+        "ShaderNodeVectorRotate", None, Vector="P", Center=(0.3, 0.2, 0.1), Axis=(0.3, 0.5, 1.0), Angle=0.8
+    ),
     "rotate euler": of("ShaderNodeVectorRotate", {"rotation_type": "EULER_XYZ"}, Vector="P", Rotation=(0.3, 0.5, 1.0)),
-    "transform": of("ShaderNodeVectorTransform", {"vector_type": "POINT", "convert_from": "OBJECT", "convert_to": "WORLD"}, s0="P"),
-    "transform to camera": of("ShaderNodeVectorTransform", {"vector_type": "VECTOR", "convert_from": "WORLD", "convert_to": "CAMERA"}, s0="P"),
+    "transform": of(
+        "ShaderNodeVectorTransform", {"vector_type": "POINT", "convert_from": "OBJECT", "convert_to": "WORLD"}, s0="P"
+    ),
+    "transform to camera": of(
+        "ShaderNodeVectorTransform", {"vector_type": "VECTOR", "convert_from": "WORLD", "convert_to": "CAMERA"}, s0="P"
+    ),
     "combine xyz": of("ShaderNodeCombineXYZ", None, s0="Y", s1="X", s2=0.4),
     "normal": of("ShaderNodeNormal", None, 1, s0="P"),
     "mix vector": of("ShaderNodeMix", {"data_type": "VECTOR"}, 1, s0=0.3, s4="P", s5=(0.5, -0.4, 0.2)),
@@ -176,7 +195,15 @@ TEXTURES = {
     "voronoi 4d": voronoi(dimensions="4D", W=0.3),
     "voronoi fractal": voronoi(Detail=2.0, Roughness=0.6),
     "checker": of("ShaderNodeTexChecker", None, Vector="P", Scale=4.0, Color1=(0.8, 0.2, 0.1), Color2=(0.1, 0.3, 0.8)),
-    "brick": of("ShaderNodeTexBrick", None, Vector="P", Scale=4.0, Color1=(0.8, 0.2, 0.1), Color2=(0.6, 0.4, 0.2), Mortar_Smooth=0.3),
+    "brick": of(
+        "ShaderNodeTexBrick",
+        None,
+        Vector="P",
+        Scale=4.0,
+        Color1=(0.8, 0.2, 0.1),
+        Color2=(0.6, 0.4, 0.2),
+        Mortar_Smooth=0.3,
+    ),
     "gradient linear": of("ShaderNodeTexGradient", None, Vector="P"),
     "gradient quadratic": of("ShaderNodeTexGradient", {"gradient_type": "QUADRATIC"}, Vector="P"),
     "gradient easing": of("ShaderNodeTexGradient", {"gradient_type": "EASING"}, Vector="P"),
@@ -185,7 +212,9 @@ TEXTURES = {
     "gradient spherical": of("ShaderNodeTexGradient", {"gradient_type": "SPHERICAL"}, Vector="P"),
     "wave": of("ShaderNodeTexWave", None, Vector="P", Scale=1.0, Distortion=2.0, Detail=2.0),
     "wave rings": of("ShaderNodeTexWave", {"wave_type": "RINGS", "wave_profile": "SAW"}, Vector="P", Scale=1.0),
-    "wave triangle": of("ShaderNodeTexWave", {"wave_profile": "TRI", "bands_direction": "DIAGONAL"}, Vector="P", Scale=1.0),
+    "wave triangle": of(
+        "ShaderNodeTexWave", {"wave_profile": "TRI", "bands_direction": "DIAGONAL"}, Vector="P", Scale=1.0
+    ),
     "magic": of("ShaderNodeTexMagic", {"turbulence_depth": 3}, Vector="P", Scale=2.0, Distortion=1.5),
     "white noise": of("ShaderNodeTexWhiteNoise", None, 1, Vector=(0.3, 0.2, 0.9)),
     "gabor": of("ShaderNodeTexGabor", {"gabor_type": "2D"}, Vector="P", Scale=4.0),
@@ -216,7 +245,12 @@ def picture(name, as_float=False, **properties):
 
 def image(as_float=False, out=0, scale=1.6, **properties):
     def build(tree, given):
-        place = node(tree, "ShaderNodeVectorMath", {"operation": "MULTIPLY_ADD"}, {0: given["P"], 1: (scale,) * 3, 2: (-0.3,) * 3})
+        place = node(
+            tree,
+            "ShaderNodeVectorMath",
+            {"operation": "MULTIPLY_ADD"},
+            {0: given["P"], 1: (scale,) * 3, 2: (-0.3,) * 3},
+        )
         made = node(tree, "ShaderNodeTexImage", None, {"Vector": place.outputs[0]})
         picture("picture", as_float, **properties)(made)
         return made.outputs[out]
@@ -314,7 +348,9 @@ def slope(tree, given):
 
 NORMALS = {
     "bump": bumped("ShaderNodeBump", Height=waves, Strength=0.8, Distance=0.1),
-    "bump inverted": bumped("ShaderNodeBump", lambda n: setattr(n, "invert", True), Height=waves, Strength=0.5, Distance=0.1),
+    "bump inverted": bumped(
+        "ShaderNodeBump", lambda n: setattr(n, "invert", True), Height=waves, Strength=0.5, Distance=0.1
+    ),
     "normal map": bumped("ShaderNodeNormalMap", Color=slope, Strength=1.0),
     "normal map weak": bumped("ShaderNodeNormalMap", Color=slope, Strength=0.4),
     "normal map object": bumped("ShaderNodeNormalMap", lambda n: setattr(n, "space", "OBJECT"), Color=slope),
@@ -330,11 +366,15 @@ def scene_of_meshes(scene):
     tree = tree_of(paint)
     colors = node(tree, "ShaderNodeVertexColor", {"layer_name": "paint"})
     output(tree, node(tree, "ShaderNodeBsdfDiffuse", None, {"Color": colors.outputs[0]}))
-    painted = mesh("painted", [(-0.5, -0.5, 0), (0.5, -0.5, 0), (0, 0.5, 0.4)], [(0, 1, 2)], paint, location=(-0.8, 0.6, 0.2))
+    painted = mesh(
+        "painted", [(-0.5, -0.5, 0), (0.5, -0.5, 0), (0, 0.5, 0.4)], [(0, 1, 2)], paint, location=(-0.8, 0.6, 0.2)
+    )
     layer = painted.data.color_attributes.new("paint", "FLOAT_COLOR", "POINT")
     for item, value in zip(layer.data, ((1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1)), strict=True):
         item.color = value
-    shiny = material("shiny", "ShaderNodeBsdfAnisotropic", {"distribution": "GGX"}, Color=(0.8, 0.7, 0.5), Roughness=0.25)
+    shiny = material(
+        "shiny", "ShaderNodeBsdfAnisotropic", {"distribution": "GGX"}, Color=(0.8, 0.7, 0.5), Roughness=0.25
+    )
     ball(shiny, 0.35, smooth=False, rings=6, location=(0.7, 0.6, 0.36))
     ball(shiny, 0.35, location=(0.7, -0.4, 0.3), scale=(-1, 1.4, 0.8), rotation=(0.3, 0.2, 0.5))
     two = cube(material("red", Color=(0.7, 0.1, 0.1)), 0.25, location=(-0.5, -0.4, 0.26), rotation=(0, 0, 0.4))
@@ -368,13 +408,22 @@ def by_ray(scene):
     made = bpy.data.materials.new("by ray")
     tree = tree_of(made)
     path = node(tree, "ShaderNodeLightPath")
-    color = node(tree, "ShaderNodeMix", {"data_type": "RGBA"}, {0: path.outputs["Is Glossy Ray"], 6: (0.7, 0.3, 0.1, 1), 7: (0.1, 0.1, 0.9, 1)})
+    color = node(
+        tree,
+        "ShaderNodeMix",
+        {"data_type": "RGBA"},
+        {0: path.outputs["Is Glossy Ray"], 6: (0.7, 0.3, 0.1, 1), 7: (0.1, 0.1, 0.9, 1)},
+    )
     diffuse = node(tree, "ShaderNodeBsdfDiffuse", None, {"Color": color.outputs[2]})
     glow = node(tree, "ShaderNodeEmission", None, {"Color": (0.2, 0.4, 0.1), "Strength": path.outputs["Is Camera Ray"]})
     both = node(tree, "ShaderNodeAddShader", None, {0: diffuse.outputs[0], 1: glow.outputs[0]})
     output(tree, both)
     square(made, 3.0)
-    ball(material("mirror", "ShaderNodeBsdfAnisotropic", {"distribution": "GGX"}, Color=(0.9, 0.9, 0.9), Roughness=0.0), 0.5, location=(0, 0, 0.5))
+    ball(
+        material("mirror", "ShaderNodeBsdfAnisotropic", {"distribution": "GGX"}, Color=(0.9, 0.9, 0.9), Roughness=0.0),
+        0.5,
+        location=(0, 0, 0.5),
+    )
     hidden = cube(material("hidden", Color=(0.8, 0.8, 0.1)), 0.2, location=(-0.9, 0, 0.3))
     hidden.visible_camera = False
     shadowless = cube(material("shadowless", Color=(0.1, 0.8, 0.8)), 0.2, location=(0.9, -0.3, 0.3))

@@ -66,7 +66,11 @@ def shared_rows(options) -> dict:
         except subprocess.TimeoutExpired:
             row["error"] = f"not done after {LIMIT} s"
         rows[path.stem] = row
-        print(path.stem, row.get("error") or f"{row['ratio']:.4f} ± {row['ratio_error']:.4f}, {row['failed']} of {row['blocks']}", flush=True)
+        print(
+            path.stem,
+            row.get("error") or f"{row['ratio']:.4f} ± {row['ratio_error']:.4f}, {row['failed']} of {row['blocks']}",
+            flush=True,
+        )
     return rows
 
 

@@ -96,7 +96,9 @@ def material(name, kind="ShaderNodeBsdfDiffuse", properties=None, **inputs):
 
 def world(color, strength=1.0):
     tree = tree_of(bpy.context.scene.world)
-    output(tree, node(tree, "ShaderNodeBackground", None, {"Color": color, "Strength": strength}), "ShaderNodeOutputWorld")
+    output(
+        tree, node(tree, "ShaderNodeBackground", None, {"Color": color, "Strength": strength}), "ShaderNodeOutputWorld"
+    )
     return tree
 
 
@@ -116,7 +118,9 @@ def mesh(name, vertices, faces, made=None, **place):
 
 
 def square(made=None, half=0.5, uv=True, **place):
-    made_object = mesh("square", [(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [range(4)], made, **place)
+    made_object = mesh(
+        "square", [(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [range(4)], made, **place
+    )
     if uv:
         layer = made_object.data.uv_layers.new(name="UVMap")
         for corner, value in zip(layer.uv, ((0, 0), (1, 0), (1, 1), (0, 1)), strict=True):
@@ -136,7 +140,9 @@ def ball(made=None, radius=0.5, smooth=True, rings=24, **place):
         t = math.pi * j / rings
         for i in range(n):
             p = 2 * math.pi * i / n
-            vertices.append((radius * math.sin(t) * math.cos(p), radius * math.sin(t) * math.sin(p), -radius * math.cos(t)))
+            vertices.append(
+                (radius * math.sin(t) * math.cos(p), radius * math.sin(t) * math.sin(p), -radius * math.cos(t))
+            )
     vertices.append((0, 0, radius))
     faces += [(0, 1 + (i + 1) % n, 1 + i) for i in range(n)]
     for j in range(rings - 2):

@@ -80,7 +80,9 @@ def scene_of(*parts, lights=(), world=None):
     for item, program in parts:
         scene.meshes.append(item)
         scene.programs.append(program)
-        scene.instances.append(sd.Instance(f"part {len(scene.instances)}", len(scene.meshes) - 1, matrix(), [len(scene.programs) - 1]))
+        scene.instances.append(
+            sd.Instance(f"part {len(scene.instances)}", len(scene.meshes) - 1, matrix(), [len(scene.programs) - 1])
+        )
     if world is not None:
         scene.programs.append(emission(strength=world, name="world"))
         scene.world = sd.World(program=len(scene.programs) - 1)
@@ -98,7 +100,9 @@ def looking(position, direction):
 # -------------------------------------------------------------------------------------------------- measuring
 
 
-def probe(scene, position, direction, samples=64, pixels=32, width=1e-4, integrator="path", seed=1, threads=2, **parameters):
+def probe(
+    scene, position, direction, samples=64, pixels=32, width=1e-4, integrator="path", seed=1, threads=2, **parameters
+):
     """(pixels, pixels) first channel of the radiance that arrives at `position` against `direction`."""
     half = width / 2
     scene.camera = sd.Camera("camera", "ORTHO", looking(position, direction), (-half, half, -half, half), 0.0, 1e6)
@@ -189,7 +193,9 @@ def test_two_squares():
 # -------------------------------------------------------------------------------------------------- direct light
 
 
-@pytest.mark.parametrize(("distance", "factor"), [(0.1, 0.42254486), (0.25, 0.31754961), (0.5, 0.19013588), (0.75, 0.11449568)])
+@pytest.mark.parametrize(
+    ("distance", "factor"), [(0.1, 0.42254486), (0.25, 0.31754961), (0.5, 0.19013588), (0.75, 0.11449568)]
+)
 def test_wall_onto_floor(distance, factor):
     """Perpendicular unit squares with a common edge: irradiance on the floor's middle line over the wall's emittance."""
     floor = quad((-0.5, 0, 0), (0.5, 0, 0), (0.5, 1, 0), (-0.5, 1, 0))
@@ -224,6 +230,17 @@ def test_triangle_of_light(corners, way):
     samples = 1024 if way == "OFF" else 64
     # From below the lamp, which stands in the way of a camera further up.
     check(probe(scene, (0.0, 0.0, 0.05), (0, 0, -1), samples=samples, light_sampling=way), truth)
+
+
+@pytest.mark.parametrize("x", [0.0, 0.2, 0.26])
+@pytest.mark.parametrize("way", ["OFF", "ON", "MIS"])
+def test_luminaire_close_to_the_ceiling(x, way):
+    """Two centimetres below: the shadow ray must not meet the luminaire that it goes to."""
+    corners = [(-0.24, -0.16, 1.98), (0.23, -0.16, 1.98), (0.23, 0.22, 1.98), (-0.24, 0.22, 1.98)]
+    ceiling = quad((-1, -1, 2), (-1, 1, 2), (1, 1, 2), (1, -1, 2))
+    scene = scene_of((ceiling, surface(1.0)), (quad(*corners), surface(0.0, 1.0)))
+    truth = lambert(corners, np.array((x, 0.1, 2.0)), np.array((0, 0, -1.0)))
+    check(probe(scene, (x, 0.1, 1.99), (0, 0, 1), samples=256, light_sampling=way, max_bounces=0), truth, rounding=2e-3)
 
 
 @pytest.mark.parametrize(

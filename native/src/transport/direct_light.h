@@ -40,8 +40,15 @@ inline LobeEval eval_for_light(const Bsdf& bsdf, Vec3 wo, const LightSample& lig
 // The share of a sampled light that arrives: what lies between is looked at last.
 inline Rgb shadowed(const RenderContext& context, const ShadingPoint& point, const LightSample& light, Rgb contribution) {
   if (!light.cast_shadow || is_black(contribution)) return contribution;
-  const Ray ray{offset_point(context.scene.shadow_origin(point, light.wi), point.ng, light.wi), light.wi, 0.0f,
-                std::isfinite(light.distance) ? light.distance * (1.0f - 1e-4f) : kInf};
+  // Towards the sampled point itself: the ray starts a little beside the point that it was sampled from, and would
+  // otherwise pass or meet a luminaire that is very near.
+  Ray ray{offset_point(context.scene.shadow_origin(point, light.wi), point.ng, light.wi), light.wi, 0.0f, kInf};
+  if (std::isfinite(light.distance)) {
+    const Vec3 to = point.position + light.wi * light.distance - ray.origin;
+    const float distance = length(to);
+    if (!(distance > 0.0f)) return contribution;
+    ray.direction = to / distance, ray.t_max = distance * (1.0f - 1e-4f);
+  }
   return contribution * context.scene.transmittance(ray, point.path);
 }
 
