@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests/physics"))
-from light_scenes import build, emission, lamp, matrix, triangle_scene, with_world  # noqa: E402
+from light_scenes import build, emission, lamp, matrix, triangle_scene, with_world
 
-from gi_engine import scene_data as sd  # noqa: E402
+from gi_engine import scene_data as sd
 
 COUNT = 50_000
 

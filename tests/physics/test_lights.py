@@ -19,7 +19,7 @@ from light_scenes import (
     uniforms,
     with_world,
 )
-from scipy import stats
+from scipy import integrate, stats
 
 from gi_engine import scene_data as sd
 from gi_engine.nodes.program import ProgramBuilder
@@ -284,7 +284,7 @@ def spread_irradiance(k, area, half, height, radius):
     """On the axis of a disk lamp with slats, or of any lamp that covers what they let through."""
     theta = np.linspace(0, min(half, np.arctan(radius / height)), 20_001)
     f = (np.tan(half) - np.tan(theta)) / (np.tan(half) - half) * np.cos(theta) * np.sin(theta)
-    return k / (np.pi * area) * 2 * np.pi * np.trapezoid(f, theta)
+    return k / (np.pi * area) * 2 * np.pi * integrate.trapezoid(f, theta)
 
 
 POINT_E = K / (4 * np.pi * 4)
