@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from ..scene_data import Program, Scene
 from .attributes import look_up
+from .node_builder import NodeBuilder, by_identifier
 from .program import COLOR, FLOAT, VECTOR, ProgramBuilder, Value
 from .rules import CLOSURE_RULES, RULES
 
@@ -20,7 +21,6 @@ for _family in ("values", "math", "color", "vector", "input", "textures", "closu
 
 KIND_OF_SOCKET = {"VALUE": FLOAT, "INT": FLOAT, "BOOLEAN": FLOAT, "VECTOR": VECTOR, "ROTATION": VECTOR, "RGBA": COLOR}
 DEFAULT_GREY = 0.8  # of objects without a material
-DISPLACEMENT_FILTER_WIDTH = 0.1  # pixels, as of a new Bump node
 DEEPEST = 20000  # Python's recursion limit while a tree is compiled: some frames for each node of a chain
 
 
@@ -311,99 +311,8 @@ class TreeWalker:
             self.builder.op("bump_restore", *before)
 
 
-class NodeBuilder:
-    """What a rule sees of its node."""
-
-    def __init__(self, walker: TreeWalker, context: Context, node):
-        self.walker, self.context, self.node = walker, context, node
-        self.builder = walker.builder
-        self.compiler = walker.compiler
-        self.op = walker.builder.op
-        self.constant = walker.builder.constant
-        self.table = walker.builder.table
-        self.component = walker.builder.component
-        self.as_kind = walker.builder.as_kind
-        self.attribute = walker.compiler.attribute
-        self.made: dict[str, Value] = {}
-
-    def socket(self, identifier: str):
-        """The input socket of that identifier (or, failing that, name); None where this Blender has no such socket."""
-        return by_identifier(self.node.inputs, identifier) or self.node.inputs.get(identifier)
-
-    def has(self, identifier: str) -> bool:
-        return self.socket(identifier) is not None
-
-    def linked(self, identifier: str) -> bool:
-        socket = self.socket(identifier)
-        return socket is not None and self.walker.resolve(self.context, socket).node is not None
-
-    def input(self, identifier: str, kind: str | None = None, default=None) -> Value:
-        """What arrives at an input. `default` is used where the socket does not exist (older Blenders)."""
-        socket = self.socket(identifier)
-        if socket is None:
-            if default is None:
-                raise KeyError(f"{self.node.bl_idname} has no input {identifier}")
-            return self.constant(*default) if isinstance(default, tuple) else self.constant(default)
-        return self.walker.value(self.context, socket, kind)
-
-    def linked_or(self, identifier: str, default) -> Value:
-        """What is linked to an input, or `default`: for sockets whose own value means nothing (Normal, Vector, Tangent)."""
-        if self.linked(identifier):
-            return self.input(identifier)
-        return default if isinstance(default, Value) else self.constant(*default)
-
-    def output(self, identifier: str, value: Value) -> None:
-        self.made[identifier] = value
-
-    def wants(self, identifier: str) -> bool:
-        """Whether anything is linked to an output: expensive outputs are made only then."""
-        socket = by_identifier(self.node.outputs, identifier) or self.node.outputs.get(identifier)
-        return socket is not None and socket.is_linked
-
-    def closure(self, identifier: str, weight: Value) -> None:
-        """Compiles the shader linked to an input. Inputs of Mix and Add Shader go by their index."""
-        self.walker.closure_input(self.context, self.socket(identifier), weight)
-
-    def branch(self, condition: Value):
-        return self.walker.branch(condition)
-
-    def shifted_values(self, make, width: Value) -> list[Value]:
-        """make() at the point, and with the point moved by `width` pixels along each axis."""
-        values = [make()]
-        for axis in (0, 1):
-            with self.walker.shifted(axis, width):
-                values.append(make())
-        return values
-
-    @property
-    def owner(self):
-        """The material, light or world."""
-        return self.walker.owner
-
-    def matrix_of(self, owner):
-        """The object to world matrix of another object that the node refers to."""
-        return self.compiler.matrix_of(owner)
-
-    def image(self, key, load) -> int:
-        return self.compiler.image(key, load)
-
-    def warn(self, text: str) -> None:
-        """One warning for the user, naming the material and this node."""
-        self.compiler.warn(f"{self.walker.who}: node '{self.node.name}' ({self.node.bl_label}): {text}")
-
-    def pass_defaults(self) -> None:
-        """An unsupported node gives the value of its outputs' own defaults."""
-        for socket in self.node.outputs:
-            self.output(socket.identifier, self.walker.default(socket))
-
-    def bump_displacement(self) -> None:
-        """Displacement as a change of the shading normal alone, before the surface is compiled."""
-        with self.walker.isolated():
-            width = self.constant(DISPLACEMENT_FILTER_WIDTH)
-            heights = self.shifted_values(
-                lambda: self.op("vector_dot_product", self.input("Displacement"), self.op("normal")), width
-            )
-            self.op("set_normal", self.op("bump", *heights, 1.0, 1.0, width, self.op("normal"), imm=(True,)))
+def kind_of(socket) -> str:
+    return KIND_OF_SOCKET.get(socket.type, FLOAT)
 
 
 def is_inlined(owner) -> bool:
@@ -424,14 +333,6 @@ def deep_recursion():
         yield
     finally:
         sys.setrecursionlimit(limit)
-
-
-def kind_of(socket) -> str:
-    return KIND_OF_SOCKET.get(socket.type, FLOAT)
-
-
-def by_identifier(sockets, identifier: str):
-    return next((s for s in sockets if s.identifier == identifier), None)
 
 
 def group_output(node):

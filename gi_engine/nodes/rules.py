@@ -8,7 +8,7 @@
     def transparent(b, weight):
         b.op("transparent", weight, b.input("Color"))
 
-`b` is a compile.NodeBuilder.
+`b` is a node_builder.NodeBuilder.
 """
 
 from __future__ import annotations
