@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import os
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import bpy
@@ -145,7 +146,7 @@ def lathe(name, profile, made, location=(0, 0, 0), steps=96, collection=None):
         angles = [2 * math.pi * i / steps for i in range(count)]
         vertices += [(radius * math.cos(a), radius * math.sin(a), height) for a in angles]
     faces = []
-    for below, above in zip(rings, rings[1:]):
+    for below, above in pairwise(rings):
         for i in range(steps):
             j = (i + 1) % steps
             corners = [below[i % len(below)], below[j % len(below)], above[j % len(above)], above[i % len(above)]]

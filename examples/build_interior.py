@@ -81,7 +81,7 @@ def room(plaster, planks):
     box("wall below windows", (-0.2, 0, 0), (0, DEPTH, SILL), plaster)
     box("wall above windows", (-0.2, 0, LINTEL), (0, DEPTH, HEIGHT), plaster)
     edges = [0.0, *[y for window in WINDOWS for y in window], DEPTH]
-    for low, high in zip(edges[::2], edges[1::2]):
+    for low, high in zip(edges[::2], edges[1::2], strict=True):
         box("wall between windows", (-0.2, low, SILL), (0, high, LINTEL), plaster)
 
 
