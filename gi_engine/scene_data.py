@@ -160,7 +160,9 @@ class Scene:
     instances: list[Instance] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     programs: list[Program] = field(default_factory=list)
-    images: list[list[Image]] = field(default_factory=list)  # the tiles of each image texture; ops refer to the outer index
+    images: list[list[Image]] = field(
+        default_factory=list
+    )  # the tiles of each image texture; ops refer to the outer index
     attribute_names: list[str] = field(default_factory=list)  # ops refer to the index; "" is the active UV map
     world: World = field(default_factory=World)
     camera: Camera | None = None

@@ -120,34 +120,45 @@ nb::list describe_integrators() {
 
 void bind_render(nb::module_& m) {
   nb::class_<BoundScene>(m, "Scene", "A scene ready to be traced, made of a scene_data.Scene.")
-      .def("__init__", [](BoundScene* self, nb::handle data, const std::string& embree, int threads) {
-             std::unique_ptr<BoundScene> made(make_scene(data, embree, threads));
-             new (self) BoundScene(std::move(*made));
-           }, nb::arg("data"), nb::arg("embree"), nb::arg("threads") = 0,
-           "`embree`: path of the Embree library. Raises ValueError naming the object or material for bad input, RuntimeError\n"
-           "where Embree or the machine fails, MemoryError.")
+      .def(
+          "__init__",
+          [](BoundScene* self, nb::handle data, const std::string& embree, int threads) {
+            std::unique_ptr<BoundScene> made(make_scene(data, embree, threads));
+            new (self) BoundScene(std::move(*made));
+          },
+          nb::arg("data"), nb::arg("embree"), nb::arg("threads") = 0,
+          "`embree`: path of the Embree library. Raises ValueError naming the object or material for bad input, RuntimeError\n"
+          "where Embree or the machine fails, MemoryError.")
       .def_prop_ro("warnings", [](const BoundScene& s) { return s.warnings; })
-      .def_prop_ro("embree", [](const BoundScene& s) { return s.scene->embree_description(); }, "The library in use and its version.")
-      .def_prop_ro("memory", [](const BoundScene& s) { return s.scene->memory_bytes(); }, "Bytes.")
+      .def_prop_ro(
+          "embree", [](const BoundScene& s) { return s.scene->embree_description(); }, "The library in use and its version.")
+      .def_prop_ro(
+          "memory", [](const BoundScene& s) { return s.scene->memory_bytes(); }, "Bytes.")
       .def("emission_seen", &emission_seen, nb::arg("camera"), nb::arg("width"), nb::arg("height"),
            "What is emitted towards the camera at the middle of each pixel: (height, width, 3) float32, row 0 at the bottom.")
-      .def("trace", [](const BoundScene& s, nb::ndarray<const float, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu> rays) {
-             const size_t n = rays.shape(0);
-             auto* t = new std::vector<float>(n);
-             for (size_t i = 0; i < n; ++i) {
-               const float* r = rays.data() + 6 * i;
-               const auto hit = s.scene->intersect({{r[0], r[1], r[2]}, {r[3], r[4], r[5]}}, ~0u);
-               (*t)[i] = hit ? hit->t : kInf;
-             }
-             nb::capsule owner(t, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
-             return nb::ndarray<nb::numpy, float>(t->data(), {n}, owner);
-           }, nb::arg("rays"), "Distances (n,) along rays (n, 6: origin, unit direction); infinite where nothing is hit.");
+      .def(
+          "trace",
+          [](const BoundScene& s, nb::ndarray<const float, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu> rays) {
+            const size_t n = rays.shape(0);
+            auto* t = new std::vector<float>(n);
+            for (size_t i = 0; i < n; ++i) {
+              const float* r = rays.data() + 6 * i;
+              const auto hit = s.scene->intersect({{r[0], r[1], r[2]}, {r[3], r[4], r[5]}}, ~0u);
+              (*t)[i] = hit ? hit->t : kInf;
+            }
+            nb::capsule owner(t, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+            return nb::ndarray<nb::numpy, float>(t->data(), {n}, owner);
+          },
+          nb::arg("rays"), "Distances (n,) along rays (n, 6: origin, unit direction); infinite where nothing is hit.");
 
   nb::class_<Session>(m, "Session", "One render in the background.")
-      .def("__init__", [](Session* self, const BoundScene& scene, nb::handle camera, nb::handle film, nb::handle settings) {
-             new (self) Session(*scene.scene, read_camera(camera), read_film(film), read_settings(settings));
-           }, nb::arg("scene"), nb::arg("camera"), nb::arg("film"), nb::arg("settings"), nb::keep_alive<1, 2>(),
-           "Takes scene_data's Camera, Film and Settings. Raises ValueError for bad input.")
+      .def(
+          "__init__",
+          [](Session* self, const BoundScene& scene, nb::handle camera, nb::handle film, nb::handle settings) {
+            new (self) Session(*scene.scene, read_camera(camera), read_film(film), read_settings(settings));
+          },
+          nb::arg("scene"), nb::arg("camera"), nb::arg("film"), nb::arg("settings"), nb::keep_alive<1, 2>(),
+          "Takes scene_data's Camera, Film and Settings. Raises ValueError for bad input.")
       .def("start", &Session::start)
       .def("wait", &Session::wait, nb::arg("seconds"), nb::call_guard<nb::gil_scoped_release>(), "True once the render has ended.")
       .def("cancel", &Session::cancel)

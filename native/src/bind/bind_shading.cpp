@@ -9,12 +9,15 @@ namespace nb = nanobind;
 namespace gi::bind {
 
 void bind_shading(nb::module_& m) {
-  m.def("ops", [] {
-    nb::dict table;
-    int code = 0;
-    for (const Op& op : ops()) table[op.name] = nb::make_tuple(code++, op.outputs, op.inputs, op.immediates);
-    return table;
-  }, "name -> (code, outputs, inputs, number of immediates); widths: 'f' is 1 register, 'v' is 3.");
+  m.def(
+      "ops",
+      [] {
+        nb::dict table;
+        int code = 0;
+        for (const Op& op : ops()) table[op.name] = nb::make_tuple(code++, op.outputs, op.inputs, op.immediates);
+        return table;
+      },
+      "name -> (code, outputs, inputs, number of immediates); widths: 'f' is 1 register, 'v' is 3.");
 }
 
 }  // namespace gi::bind

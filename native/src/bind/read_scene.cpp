@@ -41,7 +41,8 @@ struct Record {
     }
     std::vector<float> values;
     for (nb::handle x : list) values.push_back(float(nb::cast<double>(nb::float_(x))));
-    require(values.size() == n, who + ": '" + field + "' must hold " + std::to_string(n) + " numbers, not " + std::to_string(values.size()));
+    require(values.size() == n,
+            who + ": '" + field + "' must hold " + std::to_string(n) + " numbers, not " + std::to_string(values.size()));
     return values;
   }
   Rgb rgb(const char* field) const {
@@ -79,7 +80,8 @@ struct Record {
     using Nd = nb::ndarray<T, nb::c_contig, nb::device::cpu>;
     Nd nd;
     if (!nb::try_cast<Nd>(value, nd, convert))
-      throw InputError(who + ": '" + field + "' must be a contiguous array of " + type_name<T>() + ", not " + nb::cast<std::string>(nb::str(nb::type_name(value.type()))));
+      throw InputError(who + ": '" + field + "' must be a contiguous array of " + type_name<T>() + ", not " +
+                       nb::cast<std::string>(nb::str(nb::type_name(value.type()))));
     auto* keep = new Nd(nd);
     return {nd.data(), nd.size(), std::shared_ptr<void>(keep, [](void* p) {
               const nb::gil_scoped_acquire gil;
@@ -181,7 +183,8 @@ void read_instances(const Record& r, std::vector<InstanceData>& all) {
 LampData read_lamp(const Record& r) {
   LampData l;
   l.name = r.get<std::string>("name");
-  l.kind = r.choice<LampKind>("kind", {{"POINT", LampKind::kPoint}, {"SPOT", LampKind::kSpot}, {"AREA", LampKind::kArea}, {"SUN", LampKind::kSun}});
+  l.kind = r.choice<LampKind>("kind",
+                              {{"POINT", LampKind::kPoint}, {"SPOT", LampKind::kSpot}, {"AREA", LampKind::kArea}, {"SUN", LampKind::kSun}});
   l.matrix = r.matrix("matrix");
   l.color = r.rgb("color");
   l.normalize = r.get<bool>("normalize");
@@ -196,7 +199,8 @@ LampData read_lamp(const Record& r) {
   l.visibility = r.get<uint32_t>("visibility");
   l.cast_shadow = r.get<bool>("cast_shadow"), l.use_mis = r.get<bool>("use_mis");
   l.max_bounces = r.get<int>("max_bounces");
-  l.diffuse_factor = r.real("diffuse_factor"), l.glossy_factor = r.real("glossy_factor"), l.transmission_factor = r.real("transmission_factor");
+  l.diffuse_factor = r.real("diffuse_factor"), l.glossy_factor = r.real("glossy_factor"),
+  l.transmission_factor = r.real("transmission_factor");
   return l;
 }
 
@@ -240,7 +244,8 @@ Camera read_camera(nb::handle camera) {
   const Record r{nb::borrow(camera), "the camera"};
   Camera c;
   c.name = r.get<std::string>("name");
-  c.kind = r.choice<Camera::Kind>("kind", {{"PERSP", Camera::Kind::kPerspective}, {"ORTHO", Camera::Kind::kOrthographic}, {"PANO", Camera::Kind::kPanoramic}});
+  c.kind = r.choice<Camera::Kind>(
+      "kind", {{"PERSP", Camera::Kind::kPerspective}, {"ORTHO", Camera::Kind::kOrthographic}, {"PANO", Camera::Kind::kPanoramic}});
   c.to_world = r.matrix("matrix");
   require(c.to_world.determinant() != 0.0f && std::isfinite(c.to_world.determinant()), "camera '" + c.name + "' has a singular transform");
   const auto plane = r.reals("view_plane", 4);
@@ -267,7 +272,8 @@ FilmSpec read_film(nb::handle film) {
     require(v.size() == 4, "the film: 'region' must be empty or hold 4 numbers");
     f.x0 = v[0], f.y0 = v[1], f.x1 = v[2], f.y1 = v[3];
   }
-  f.filter = r.choice<FilterKind>("filter", {{"BOX", FilterKind::kBox}, {"GAUSSIAN", FilterKind::kGaussian}, {"BLACKMAN_HARRIS", FilterKind::kBlackmanHarris}});
+  f.filter = r.choice<FilterKind>(
+      "filter", {{"BOX", FilterKind::kBox}, {"GAUSSIAN", FilterKind::kGaussian}, {"BLACKMAN_HARRIS", FilterKind::kBlackmanHarris}});
   f.filter_width = r.real("filter_width");
   f.exposure = r.real("exposure");
   f.transparent = r.get<bool>("transparent"), f.transparent_glass = r.get<bool>("transparent_glass");

@@ -54,9 +54,11 @@ int Film::channels(const std::string& pass) {
 }
 
 Film::Film(FilmSpec spec) : spec_(std::move(spec)), filter_(spec_.filter, spec_.filter_width) {
-  require(spec_.width > 0 && spec_.height > 0, "the image must have at least one pixel, not " + std::to_string(spec_.width) + " x " + std::to_string(spec_.height));
-  require(spec_.x0 >= 0 && spec_.y0 >= 0 && spec_.x1 <= spec_.width && spec_.y1 <= spec_.height && spec_.x0 < spec_.x1 && spec_.y0 < spec_.y1,
-          "the render region is empty or lies outside the image");
+  require(spec_.width > 0 && spec_.height > 0,
+          "the image must have at least one pixel, not " + std::to_string(spec_.width) + " x " + std::to_string(spec_.height));
+  require(
+      spec_.x0 >= 0 && spec_.y0 >= 0 && spec_.x1 <= spec_.width && spec_.y1 <= spec_.height && spec_.x0 < spec_.x1 && spec_.y0 < spec_.y1,
+      "the render region is empty or lies outside the image");
   const int w = spec_.region_width(), h = spec_.region_height();
   // From the top down, as people read pictures.
   for (int y = h; y > 0; y -= kTileSize)

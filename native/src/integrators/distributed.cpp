@@ -12,10 +12,12 @@ constexpr uint32_t kPairsPerBounce = 8;
 class DistributedIntegrator final : public Integrator {
  public:
   explicit DistributedIntegrator(const Parameters& p)
-      : limits_{p.integer("max_bounces"), 0, p.integer("glossy_bounces"), p.integer("transmission_bounces"), p.integer("transparent_bounces")} {}
+      : limits_{p.integer("max_bounces"), 0, p.integer("glossy_bounces"), p.integer("transmission_bounces"),
+                p.integer("transparent_bounces")} {}
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
-    for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler) { return trace(context, film.spec(), camera, sampler); });
+    for_each_pixel(context, pass, film,
+                   [&](const CameraRay& camera, Sampler& sampler) { return trace(context, film.spec(), camera, sampler); });
   }
 
  private:

@@ -62,13 +62,21 @@ float continuation_probability(const PathSettings& s, const PathState& path, Rgb
 class PathIntegrator final : public Integrator {
  public:
   explicit PathIntegrator(const Parameters& p)
-      : s_{LightSampling(p.integer("light_sampling")), DirectionSampling(p.integer("direction_sampling")),
-           Continuation(p.integer("continuation")), p.real("continuation_constant"), p.integer("min_bounces"),
-           {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"), p.integer("transparent_bounces")},
-           p.real("clamp_direct"), p.real("clamp_indirect"), p.on("caustics_reflective"), p.on("caustics_refractive")} {}
+      : s_{LightSampling(p.integer("light_sampling")),
+           DirectionSampling(p.integer("direction_sampling")),
+           Continuation(p.integer("continuation")),
+           p.real("continuation_constant"),
+           p.integer("min_bounces"),
+           {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
+            p.integer("transparent_bounces")},
+           p.real("clamp_direct"),
+           p.real("clamp_indirect"),
+           p.on("caustics_reflective"),
+           p.on("caustics_refractive")} {}
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
-    for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler) { return trace(context, film.spec(), camera, sampler); });
+    for_each_pixel(context, pass, film,
+                   [&](const CameraRay& camera, Sampler& sampler) { return trace(context, film.spec(), camera, sampler); });
   }
 
  private:
@@ -186,14 +194,41 @@ const Descriptor& path_descriptor() {
       "Path Tracing",
       "All of global illumination by random walks from the camera; unbiased",
       {
-          {"light_sampling", "Light Sampling", Kind::kChoice, 2, 0, 2, "How direct light is found", "",
-           {{"OFF", "Off", "Only rays that happen to meet a luminaire count: the naive method, a reference for the others. Point lights and suns without a size are not seen"},
+          {"light_sampling",
+           "Light Sampling",
+           Kind::kChoice,
+           2,
+           0,
+           2,
+           "How direct light is found",
+           "",
+           {{"OFF", "Off",
+             "Only rays that happen to meet a luminaire count: the naive method, a reference for the others. Point lights and suns without "
+             "a size are not seen"},
             {"ON", "On", "A light is chosen at every surface; luminaires that rays meet by chance are left out"},
             {"MIS", "Multiple Importance", "Both ways, weighed by the power heuristic"}}},
-          {"direction_sampling", "Direction Sampling", Kind::kChoice, 2, 0, 2, "The density P from which directions are drawn", "",
-           {{"UNIFORM", "Uniform", "Every direction of the hemisphere alike"}, {"COSINE", "Cosine", "Proportional to the cosine with the normal"}, {"BSDF", "BSDF", "As the surface scatters"}}},
-          {"continuation", "Continuation", Kind::kChoice, 1, 0, 2, "The probability with which a path goes on after a bounce", "",
-           {{"ALBEDO", "Albedo", "What the surface reflects"}, {"THROUGHPUT", "Throughput", "Square root of what the whole path still carries"}, {"CONSTANT", "Constant", "A fixed number"}}},
+          {"direction_sampling",
+           "Direction Sampling",
+           Kind::kChoice,
+           2,
+           0,
+           2,
+           "The density P from which directions are drawn",
+           "",
+           {{"UNIFORM", "Uniform", "Every direction of the hemisphere alike"},
+            {"COSINE", "Cosine", "Proportional to the cosine with the normal"},
+            {"BSDF", "BSDF", "As the surface scatters"}}},
+          {"continuation",
+           "Continuation",
+           Kind::kChoice,
+           1,
+           0,
+           2,
+           "The probability with which a path goes on after a bounce",
+           "",
+           {{"ALBEDO", "Albedo", "What the surface reflects"},
+            {"THROUGHPUT", "Throughput", "Square root of what the whole path still carries"},
+            {"CONSTANT", "Constant", "A fixed number"}}},
           {"continuation_constant", "Constant", Kind::kFloat, 0.7, 0.01, 1, "Probability of going on where it is constant"},
           {"min_bounces", "Minimum Bounces", Kind::kInt, 0, 0, 1024, "Bounces before roulette begins"},
           {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
@@ -201,8 +236,10 @@ const Descriptor& path_descriptor() {
           {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},
           {"transmission_bounces", "Transmission", Kind::kInt, 12, 0, 1024, "Refractions"},
           {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
-          {"clamp_direct", "Clamp Direct", Kind::kFloat, 0, 0, 1e9, "Largest radiance that one sample may add directly; 0 is off. Loses light"},
-          {"clamp_indirect", "Clamp Indirect", Kind::kFloat, 0, 0, 1e9, "Largest radiance that one sample may add after a bounce; 0 is off. Loses light"},
+          {"clamp_direct", "Clamp Direct", Kind::kFloat, 0, 0, 1e9,
+           "Largest radiance that one sample may add directly; 0 is off. Loses light"},
+          {"clamp_indirect", "Clamp Indirect", Kind::kFloat, 0, 0, 1e9,
+           "Largest radiance that one sample may add after a bounce; 0 is off. Loses light"},
           {"caustics_reflective", "Reflective Caustics", Kind::kBool, 1, 0, 1, "Mirrors and glossy surfaces seen by diffuse ones"},
           {"caustics_refractive", "Refractive Caustics", Kind::kBool, 1, 0, 1, "Glass seen by diffuse surfaces"},
       },

@@ -13,10 +13,12 @@ constexpr uint32_t kAllLights = 32;
 
 class WhittedIntegrator final : public Integrator {
  public:
-  explicit WhittedIntegrator(const Parameters& p) : limits_{p.integer("max_bounces"), 0, p.integer("max_bounces"), p.integer("max_bounces"), p.integer("transparent_bounces")} {}
+  explicit WhittedIntegrator(const Parameters& p)
+      : limits_{p.integer("max_bounces"), 0, p.integer("max_bounces"), p.integer("max_bounces"), p.integer("transparent_bounces")} {}
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
-    for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler) { return trace(context, film.spec(), camera, sampler); });
+    for_each_pixel(context, pass, film,
+                   [&](const CameraRay& camera, Sampler& sampler) { return trace(context, film.spec(), camera, sampler); });
   }
 
  private:

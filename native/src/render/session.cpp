@@ -14,7 +14,8 @@ double now() { return std::chrono::duration<double>(std::chrono::steady_clock::n
 
 Session::Session(const Scene& scene, const Camera& camera, FilmSpec film, RenderSettings settings)
     : scene_(scene), camera_(camera), film_(std::move(film)), settings_(std::move(settings)) {
-  require(settings_.samples >= 0 && settings_.time_limit >= 0 && settings_.noise_target >= 0, "samples, time limit and noise target must not be negative");
+  require(settings_.samples >= 0 && settings_.time_limit >= 0 && settings_.noise_target >= 0,
+          "samples, time limit and noise target must not be negative");
   require(settings_.samples > 0 || settings_.time_limit > 0 || settings_.noise_target > 0,
           "0 samples and neither a time limit nor a noise target: there is nothing to render");
   const Descriptor& d = find_integrator(settings_.integrator);
@@ -102,7 +103,8 @@ Progress Session::progress() const {
   // Noise falls with the square root of the number of passes.
   if (settings_.samples > 0) p.fraction = passes / settings_.samples;
   if (settings_.time_limit > 0) p.fraction = std::max(p.fraction, p.seconds / settings_.time_limit);
-  if (settings_.noise_target > 0 && std::isfinite(p.noise)) p.fraction = std::max(p.fraction, double(sqr(settings_.noise_target / std::max(p.noise, 1e-6f))));
+  if (settings_.noise_target > 0 && std::isfinite(p.noise))
+    p.fraction = std::max(p.fraction, double(sqr(settings_.noise_target / std::max(p.noise, 1e-6f))));
   p.fraction = p.done && !p.cancelled ? 1.0 : std::min(p.fraction, 1.0);
   p.remaining = p.done ? 0.0 : p.fraction > 0 ? p.seconds * (1 / p.fraction - 1) : double(kInf);
   return p;

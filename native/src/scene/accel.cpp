@@ -103,8 +103,18 @@ class EmbreeAccel final : public Accel {
   }
 
   static void fill(embree::Ray& r, const gi::Ray& ray, uint32_t mask) {
-    r = {ray.origin.x, ray.origin.y, ray.origin.z, ray.t_min, ray.direction.x, ray.direction.y,
-         ray.direction.z, 0.0f, ray.t_max, mask, 0, 0};
+    r = {ray.origin.x,
+         ray.origin.y,
+         ray.origin.z,
+         ray.t_min,
+         ray.direction.x,
+         ray.direction.y,
+         ray.direction.z,
+         0.0f,
+         ray.t_max,
+         mask,
+         0,
+         0};
   }
 
   Geometry triangles(const AccelMesh& mesh) {

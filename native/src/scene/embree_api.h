@@ -61,27 +61,27 @@ using ErrorFunction = void (*)(void*, int, const char*);
 using MemoryFunction = bool (*)(void*, ptrdiff_t, bool);
 
 // X(name, result, arguments)
-#define GI_EMBREE_FUNCTIONS(X)                                                                    \
-  X(NewDevice, Device, (const char*))                                                             \
-  X(ReleaseDevice, void, (Device))                                                                \
-  X(GetDeviceProperty, ptrdiff_t, (Device, int))                                                  \
-  X(GetDeviceError, int, (Device))                                                                \
-  X(SetDeviceErrorFunction, void, (Device, ErrorFunction, void*))                                 \
-  X(SetDeviceMemoryMonitorFunction, void, (Device, MemoryFunction, void*))                        \
-  X(NewScene, Scene, (Device))                                                                    \
-  X(ReleaseScene, void, (Scene))                                                                  \
-  X(SetSceneFlags, void, (Scene, int))                                                            \
-  X(SetSceneBuildQuality, void, (Scene, int))                                                     \
-  X(CommitScene, void, (Scene))                                                                   \
-  X(AttachGeometryByID, void, (Scene, Geometry, uint32_t))                                        \
-  X(NewGeometry, Geometry, (Device, int))                                                         \
-  X(ReleaseGeometry, void, (Geometry))                                                            \
-  X(CommitGeometry, void, (Geometry))                                                             \
-  X(SetGeometryMask, void, (Geometry, uint32_t))                                                  \
+#define GI_EMBREE_FUNCTIONS(X)                                                                          \
+  X(NewDevice, Device, (const char*))                                                                   \
+  X(ReleaseDevice, void, (Device))                                                                      \
+  X(GetDeviceProperty, ptrdiff_t, (Device, int))                                                        \
+  X(GetDeviceError, int, (Device))                                                                      \
+  X(SetDeviceErrorFunction, void, (Device, ErrorFunction, void*))                                       \
+  X(SetDeviceMemoryMonitorFunction, void, (Device, MemoryFunction, void*))                              \
+  X(NewScene, Scene, (Device))                                                                          \
+  X(ReleaseScene, void, (Scene))                                                                        \
+  X(SetSceneFlags, void, (Scene, int))                                                                  \
+  X(SetSceneBuildQuality, void, (Scene, int))                                                           \
+  X(CommitScene, void, (Scene))                                                                         \
+  X(AttachGeometryByID, void, (Scene, Geometry, uint32_t))                                              \
+  X(NewGeometry, Geometry, (Device, int))                                                               \
+  X(ReleaseGeometry, void, (Geometry))                                                                  \
+  X(CommitGeometry, void, (Geometry))                                                                   \
+  X(SetGeometryMask, void, (Geometry, uint32_t))                                                        \
   X(SetSharedGeometryBuffer, void, (Geometry, int, uint32_t, int, const void*, size_t, size_t, size_t)) \
-  X(SetGeometryInstancedScene, void, (Geometry, Scene))                                           \
-  X(SetGeometryTransform, void, (Geometry, uint32_t, int, const void*))                           \
-  X(Intersect1, void, (Scene, RayHit*, QueryArguments*))                                          \
+  X(SetGeometryInstancedScene, void, (Geometry, Scene))                                                 \
+  X(SetGeometryTransform, void, (Geometry, uint32_t, int, const void*))                                 \
+  X(Intersect1, void, (Scene, RayHit*, QueryArguments*))                                                \
   X(Occluded1, void, (Scene, Ray*, QueryArguments*))
 
 struct Api {

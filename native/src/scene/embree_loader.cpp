@@ -51,11 +51,11 @@ const Api& load_embree(const std::string& path) {
   if (const auto it = opened.find(path); it != opened.end()) return it->second;
   void* handle = open_library(path);
   Api api;
-#define GI_EMBREE_RESOLVE(name, result, arguments)                                            \
-  {                                                                                           \
-    void* symbol = find_symbol(handle, "rtc" #name);                                          \
-    if (!symbol) throw DeviceError("the Embree library " + path + " lacks rtc" #name);        \
-    std::memcpy(&api.name, &symbol, sizeof symbol);                                           \
+#define GI_EMBREE_RESOLVE(name, result, arguments)                                     \
+  {                                                                                    \
+    void* symbol = find_symbol(handle, "rtc" #name);                                   \
+    if (!symbol) throw DeviceError("the Embree library " + path + " lacks rtc" #name); \
+    std::memcpy(&api.name, &symbol, sizeof symbol);                                    \
   }
   GI_EMBREE_FUNCTIONS(GI_EMBREE_RESOLVE)
 #undef GI_EMBREE_RESOLVE

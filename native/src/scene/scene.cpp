@@ -194,7 +194,8 @@ Vec3 Scene::shadow_origin(const ShadingPoint& point, Vec3 wi) const {
   // How near the terminator is: by both normals where light grazes the shading one, fading out towards the cutoff.
   const float side = dot(point.ns, wi) < 0.0f ? -1.0f : 1.0f;
   const float cos_shading = side * dot(point.ns, wi), cos_geometric = side * dot(point.ng, wi);
-  const float amount = cos_shading < cutoff ? clamp01(2.0f - (cos_geometric + cos_shading) / cutoff) : clamp01(1.0f - cos_geometric / cutoff);
+  const float amount =
+      cos_shading < cutoff ? clamp01(2.0f - (cos_geometric + cos_shading) / cutoff) : clamp01(1.0f - cos_geometric / cutoff);
   if (amount == 0.0f) return point.position;
 
   // Height of the parabolic patch whose edges bend as the corner normals say.
@@ -230,9 +231,7 @@ void Scene::shade(ShadingPoint& point, Bsdf& bsdf) const {
   bsdf.finish(point.wo);
 }
 
-Rgb Scene::emission(ShadingPoint& point) const {
-  return run_emission(material_of(point.instance, point.triangle), point);
-}
+Rgb Scene::emission(ShadingPoint& point) const { return run_emission(material_of(point.instance, point.triangle), point); }
 
 Rgb Scene::run_emission(int program, ShadingPoint& point) const {
   const Program& p = material(program).program;

@@ -61,14 +61,16 @@ void validate_mesh(MeshData& mesh, std::vector<std::string>& warnings) {
   require(mesh.face_material.empty() || !mesh.tri_face.empty() || mesh.triangle_count() == 0, who + "face_material needs tri_face");
   if (mesh.normals_domain != Domain::kFace) {
     const size_t want = 3 * elements(mesh, mesh.normals_domain, faces);
-    require(mesh.normals.size == want, who + "normals has " + std::to_string(mesh.normals.size) + " values instead of " + std::to_string(want));
+    require(mesh.normals.size == want,
+            who + "normals has " + std::to_string(mesh.normals.size) + " values instead of " + std::to_string(want));
   }
   for (const AttributeData& a : mesh.attributes) {
     require(a.components >= 1 && a.components <= 4, who + "attribute '" + a.name + "' must have 1 to 4 components");
     require(a.domain != Domain::kFace || !mesh.tri_face.empty() || mesh.triangle_count() == 0,
             who + "attribute '" + a.name + "' on faces needs tri_face");
     const size_t least = elements(mesh, a.domain, faces) * size_t(a.components);
-    require(a.data.size >= least, who + "attribute '" + a.name + "' has " + std::to_string(a.data.size) + " values instead of " + std::to_string(least));
+    require(a.data.size >= least,
+            who + "attribute '" + a.name + "' has " + std::to_string(a.data.size) + " values instead of " + std::to_string(least));
   }
 }
 
@@ -80,7 +82,8 @@ bool is_finite(const Affine& m) {
 }
 
 void check_program(const SceneData& data, int program, const std::string& who, int least) {
-  require(program >= least && program < int(data.materials.size()), who + " refers to program " + std::to_string(program) + ", which does not exist");
+  require(program >= least && program < int(data.materials.size()),
+          who + " refers to program " + std::to_string(program) + ", which does not exist");
 }
 
 }  // namespace

@@ -61,14 +61,12 @@ int extend(int x, int n, Extension e) {
       const int r = x % n;
       return r < 0 ? r + n : r;
     }
-    case Extension::kExtend:
-      return std::clamp(x, 0, n - 1);
+    case Extension::kExtend: return std::clamp(x, 0, n - 1);
     case Extension::kMirror: {
       const int m = (x < 0 ? -1 - x : x) % (2 * n);
       return m < n ? m : 2 * n - 1 - m;
     }
-    case Extension::kClip:
-      return x < 0 || x >= n ? -1 : x;
+    case Extension::kClip: return x < 0 || x >= n ? -1 : x;
   }
   return -1;
 }

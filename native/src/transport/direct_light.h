@@ -32,7 +32,8 @@ inline LobeEval eval_for_light(const Bsdf& bsdf, Vec3 wo, const LightSample& lig
   if (below) {
     e.value *= light.transmission_scale;
   } else {
-    e.value = bsdf.eval(wo, light.wi, kReflection | kDiffuse).value * light.diffuse_scale + bsdf.eval(wo, light.wi, kReflection | kGlossy).value * light.glossy_scale;
+    e.value = bsdf.eval(wo, light.wi, kReflection | kDiffuse).value * light.diffuse_scale +
+              bsdf.eval(wo, light.wi, kReflection | kGlossy).value * light.glossy_scale;
   }
   return e;
 }

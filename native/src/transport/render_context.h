@@ -19,5 +19,4 @@ struct RenderContext {
   std::atomic<int>& tiles_done;  // of the pass under way
 };
 
-
 }  // namespace gi
