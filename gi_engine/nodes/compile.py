@@ -182,7 +182,7 @@ class TreeWalker:
                 inner = next((i for i in node.internal_links if i.to_socket == output), None)
                 if inner is None:
                     return unlinked
-                through += [kind_of(output), kind_of(inner.from_socket)]
+                through.append(kind_of(output))
                 socket = inner.from_socket
             elif node.type in {"GROUP", "CUSTOM GROUP"}:
                 inside = group_output(node)
