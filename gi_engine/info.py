@@ -25,6 +25,7 @@ def describe(scene: Scene, settings: Settings) -> list[str]:
     ]
     session = Session(scene, settings)
     lines.append(f"memory: {session.progress().get('memory', 0) / 2**20:.0f} MiB for scene and film")
+    lines.append(f"Embree: {session.native_scene.embree}")
     return lines + [f"warning: {message}" for message in session.warnings()]
 
 

@@ -30,6 +30,8 @@ def test_what_would_be_rendered(gi, stage):
         "3 stored, 5 placed",
         "1 point, 1 sun",
         '"grey"',
+        "Embree: ",
+        "embree4",
     ):
         assert words in done.out, (words, done.out)
     assert not list(stage.folder.glob("*.png"))
