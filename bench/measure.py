@@ -82,12 +82,16 @@ def in_child(path: Path, engine: str, pixels: int, seconds: float, threads: int)
     except subprocess.TimeoutExpired:
         return {"error": f"not done after {LIMIT} s"}
     lines = [line for line in done.stdout.splitlines() if line.startswith('{"start"')]
-    return json.loads(lines[-1]) if lines else {"error": (done.stderr.strip().splitlines() or [str(done.returncode)])[-1]}
+    return (
+        json.loads(lines[-1]) if lines else {"error": (done.stderr.strip().splitlines() or [str(done.returncode)])[-1]}
+    )
 
 
 def scenes(words=()) -> list[Path]:
     """The shared scenes beside the checkout, else the examples."""
-    folder = next((p / "shared" / "scenes" for p in ROOT.parents if (p / "shared" / "scenes").is_dir()), ROOT / "examples")
+    folder = next(
+        (p / "shared" / "scenes" for p in ROOT.parents if (p / "shared" / "scenes").is_dir()), ROOT / "examples"
+    )
     return [p for p in sorted(folder.glob("*.blend")) if not words or any(word in p.stem for word in words)]
 
 

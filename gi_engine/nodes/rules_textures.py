@@ -104,17 +104,18 @@ def white_noise(b):
     b.output("Color", color)
 
 
-def hashes_floats() -> bool:
-    """Blender 5.0 changed the hash of Voronoi cells, and with it every pattern."""
-    import bpy
-
-    return bpy.app.version < (5, 0, 0)
-
-
 @rule("ShaderNodeTexVoronoi")
 def voronoi(b):
+    from ..export.version import voronoi_hashes_floats  # needs bpy
+
     n = b.node
-    imm = (DIMENSIONS[n.voronoi_dimensions], FEATURES[n.feature], METRICS[n.distance], n.normalize, hashes_floats())
+    imm = (
+        DIMENSIONS[n.voronoi_dimensions],
+        FEATURES[n.feature],
+        METRICS[n.distance],
+        n.normalize,
+        voronoi_hashes_floats(),
+    )
     names = ("W", "Scale", "Detail", "Roughness", "Lacunarity", "Smoothness", "Exponent", "Randomness")
     distance, color, position, w = b.op("voronoi", vector(b, generated), *(b.input(name) for name in names), imm=imm)
     b.output("Distance", distance)

@@ -1,0 +1,8 @@
+"""What depends on Blender's version in what its nodes mean."""
+
+import bpy
+
+
+def voronoi_hashes_floats() -> bool:
+    """Blender 5.0 changed the hash of Voronoi cells, and with it every pattern."""
+    return bpy.app.version < (5, 0, 0)
