@@ -27,7 +27,9 @@ def row_of(path: Path, options) -> dict:
             if "error" in one:
                 return {"scene": path.stem, "error": f"{engine}: {one['error']}"}
             found[engine].append(one)
-    medians = {e: {key: statistics.median(o[key] for o in found[e]) for key in ("start", "rate", "memory")} for e in ENGINES}
+    medians = {
+        e: {key: statistics.median(o[key] for o in found[e]) for key in ("start", "rate", "memory")} for e in ENGINES
+    }
     cycles, ours = medians["CYCLES"], medians["GI_ENGINE"]
     goal = 2.0 if path.stem in SIMPLE else 1.5
     return {"scene": path.stem, "goal": goal, "ratio": ours["rate"] / cycles["rate"], "engines": medians}
@@ -49,7 +51,9 @@ def write(rows: list[dict], options) -> str:
     text = (
         f"# Path tracing, GI Engine / Cycles\n\n{options.threads} threads, {options.pixels} pixels, medians of {options.rounds} rounds;"
         f" {reached} of {len(rows)} reach their goal.\n\n"
-        "| scene | ratio | samples/s | one sample, s | memory, MB | |\n|---|---|---|---|---|---|\n" + "\n".join(map(line_of, rows)) + "\n"
+        "| scene | ratio | samples/s | one sample, s | memory, MB | |\n|---|---|---|---|---|---|\n"
+        + "\n".join(map(line_of, rows))
+        + "\n"
     )
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "throughput.json").write_text(json.dumps(rows, indent=1) + "\n")

@@ -15,7 +15,7 @@ class Shaders:
 
     def __init__(self, scene: Scene, depsgraph, warnings: Warnings):
         self.scene = scene
-        self.compiler = Compiler(scene, depsgraph, warnings.add)
+        self.compiler = Compiler(scene, depsgraph, warnings.add, bpy.app.version >= (5, 0, 0))
         self.index_of: dict[int, int] = {}
 
     def slots(self, materials: list) -> list[int]:

@@ -21,6 +21,7 @@ for _family in ("values", "math", "color", "vector", "input", "textures", "closu
 
 KIND_OF_SOCKET = {"VALUE": FLOAT, "INT": FLOAT, "BOOLEAN": FLOAT, "VECTOR": VECTOR, "ROTATION": VECTOR, "RGBA": COLOR}
 DEFAULT_GREY = 0.8  # of objects without a material
+MULTI_GGX = 3  # as in rules_closures
 DEEPEST = 20000  # Python's recursion limit while a tree is compiled: some frames for each node of a chain
 
 
@@ -50,9 +51,10 @@ class Source:
 class Compiler:
     """Compiles what it is given and collects the images and attribute names that programs refer to in `scene`.
 
-    warn(message) is called once for each thing that had to be replaced."""
+    warn(message) is called once for each thing that had to be replaced; `principled_default`: see _default_material."""
 
-    def __init__(self, scene: Scene, depsgraph, warn):
+    def __init__(self, scene: Scene, depsgraph, warn, principled_default: bool = True):
+        self.principled_default = principled_default
         self.scene = scene
         self.depsgraph = depsgraph
         self._warn = warn
@@ -90,7 +92,7 @@ class Compiler:
 
     def material(self, material) -> Program:
         if material is None:
-            return self._plain("default material", (DEFAULT_GREY,) * 3)
+            return self._default_material()
         if not has_nodes(material):
             return self._plain(material.name, tuple(material.diffuse_color[:3]))
         walker = TreeWalker(self, f"material '{material.name}'", material)
@@ -122,6 +124,18 @@ class Compiler:
             with deep_recursion():
                 walker.closure_input(Context(owner.node_tree), output.inputs["Surface"], walker.builder.constant(1.0))
         return walker.builder.finish(owner.name)
+
+    def _default_material(self) -> Program:
+        """What Cycles gives to objects without a material: a fresh Principled BSDF from 5.0 on, diffuse before."""
+        grey, white, none = (DEFAULT_GREY,) * 3, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
+        if not self.principled_default:
+            return self._plain("default material", grey)
+        coat_and_sheen = (0.0, 0.03, 1.5, white, none, 0.0, 0.5, white)
+        base = (grey, 0.0, 0.5, 1.5, 0.0, 0.0, 0.0, 0.0, 0.5, white, 0.0, 0.0, none)
+        transmission_and_film = (0.0, 0.0, 1.33)
+        builder = ProgramBuilder()
+        builder.op("principled", 1.0, 1.0, none, *coat_and_sheen, *base, *transmission_and_film, imm=(MULTI_GGX,))
+        return builder.finish("default material")
 
     def _plain(self, name: str, color: tuple) -> Program:
         builder = ProgramBuilder()

@@ -1,6 +1,6 @@
 """One tile per closure and variant: smooth balls from above under a square lamp and a constant sky."""
 
-from .studio import LAMP, SKY, ball, lamp, material, node, output, sheet, tree_of, world
+from .studio import LAMP, SKY, Case, ball, lamp, material, node, ortho_from_above, output, sheet, tree_of, world
 
 GLOSSY, GLASS, PRINCIPLED = "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfGlass", "ShaderNodeBsdfPrincipled"
 BRASS, RED = (0.9, 0.7, 0.4), (0.7, 0.2, 0.15)
@@ -107,7 +107,14 @@ def small_ball(made):
     return ball(made, 0.42, rings=32)
 
 
+def no_material(scene):
+    ball(None, 0.42, rings=32)
+    light()
+    ortho_from_above(1.0)
+
+
 CASES = [
+    Case("no material", no_material),
     sheet("closures", SIMPLE, small_ball, light),
     sheet("clear closures", CLEAR, small_ball, light, samples=128),
     sheet("principled", LAYERED, small_ball, light),
