@@ -10,6 +10,9 @@ namespace {
 
 constexpr int kProbeWidth = 64;         // is there anything, and does it vary?
 constexpr int kLeastWidth = 512, kMostWidth = 2048;  // of the automatic map
+constexpr int kFine = 16;               // texels across a bright texel's own map
+constexpr float kBright = 32.0f;        // times the mean
+constexpr size_t kMostFine = 4096;      // bright texels
 constexpr float kFloor = 0.02f;         // of the mean, everywhere: what lies between the map's samples is not ruled out
 
 float strength(const Scene& scene, float x, float y) {
@@ -99,7 +102,58 @@ WorldLight::WorldLight(const Scene& scene, int threads) {
       density[size_t(y) * size_t(width) + size_t(x)] = s * (blurred + kFloor * mean_);
     }
   }
+  refine(scene, density, width, pool);
   map_ = Distribution2D(density, width, height);
+}
+
+// The brightest texels get maps of their own, and by them a better estimate of what they are worth.
+void WorldLight::refine(const Scene& scene, std::vector<float>& density, int width, ThreadPool& pool) {
+  const int height = width / 2;
+  double total = 0;
+  for (const float d : density) total += double(d);
+  const float bright = float(kBright * total / double(density.size()));
+  std::vector<size_t> hot;
+  for (size_t i = 0; i < density.size(); ++i)
+    if (density[i] > bright) hot.push_back(i);
+  if (hot.size() > kMostFine) {
+    std::nth_element(hot.begin(), hot.begin() + kMostFine, hot.end(), [&](size_t a, size_t b) { return density[a] > density[b]; });
+    hot.resize(kMostFine);
+  }
+  // Their neighbours too: a disc may just reach into a texel.
+  std::vector<char> near(density.size(), 0);
+  for (const size_t i : hot)
+    for (int k = 0; k < 9; ++k) {
+      const int x = (int(i % size_t(width)) + k % 3 - 1 + width) % width, y = std::clamp(int(i / size_t(width)) + k / 3 - 1, 0, height - 1);
+      near[size_t(y) * size_t(width) + size_t(x)] = 1;
+    }
+  hot.clear();
+  for (size_t i = 0; i < near.size(); ++i)
+    if (near[i]) hot.push_back(i);
+  fine_of_.assign(density.size(), -1);
+  fine_.resize(hot.size());
+  const std::atomic<bool> go_on{false};
+  pool.for_each(int(hot.size()), go_on, [&](int k) {
+    const size_t texel = hot[size_t(k)];
+    const float s = std::sin(kPi * (float(texel / size_t(width)) + 0.5f) / float(height)), x0 = float(texel % size_t(width)), y0 = float(texel / size_t(width));
+    // One row more on each side, so that every value knows its neighbours.
+    constexpr int kRing = kFine + 2;
+    float values[kRing * kRing], sum = 0;
+    for (int i = 0; i < kRing * kRing; ++i) {
+      const float x = x0 + (float(i % kRing) - 0.5f) / kFine, y = y0 + (float(i / kRing) - 0.5f) / kFine;
+      values[i] = strength(scene, x / float(width), std::clamp(y / float(height), 0.0f, 1.0f));
+    }
+    std::vector<float> inside(kFine * kFine);
+    for (int i = 0; i < kFine * kFine; ++i) {
+      const float* at = values + (i / kFine + 1) * kRing + i % kFine + 1;
+      float brightest = 0;
+      for (const int row : {-kRing, 0, kRing}) brightest = std::max({brightest, at[row - 1], at[row], at[row + 1]});
+      inside[size_t(i)] = 0.5f * (*at + brightest) + kFloor * mean_;  // the edge of a disc lies between samples
+      sum += inside[size_t(i)];
+    }
+    density[texel] = s * sum / (kFine * kFine);
+    fine_[size_t(k)] = Distribution2D(inside, kFine, kFine);
+    fine_of_[texel] = int32_t(k);
+  });
 }
 
 }  // namespace gi
