@@ -75,7 +75,10 @@ def read_single(image, name: str, warn, path: str) -> Image:
     if image.is_float:
         pixels = with_four_channels(np.array(pixels_of(image)), image)
         np.nan_to_num(pixels, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
-        return Image(name, pixels, alpha="PREMULTIPLIED" if alpha == "STRAIGHT" else alpha)
+        # What files hold is associated already, which Blender marks as PREMUL; Cycles multiplies what is marked STRAIGHT.
+        return Image(
+            name, pixels, alpha="PREMULTIPLIED" if image.alpha_mode == "PREMUL" and alpha == "STRAIGHT" else alpha
+        )
     encoded = with_four_channels(pixels_of(image), image)
     if space in (DATA, SCENE_LINEAR, "sRGB") and working_space() == SCENE_LINEAR:
         return Image(name, to_bytes(encoded), srgb=space == "sRGB", alpha=alpha)

@@ -64,8 +64,14 @@ def test_float_image_is_scene_linear():
     image = bpy.data.images.new("float", 2, 2, alpha=True, float_buffer=True)
     image.pixels.foreach_set(np.tile(np.array([4.0, 0.5, 0.25, 1.0], np.float32), 4))
     tile, warnings = read(image)
-    assert not warnings and tile.pixels.dtype == np.float32 and tile.alpha == "PREMULTIPLIED"
+    assert not warnings and tile.pixels.dtype == np.float32 and tile.alpha == "STRAIGHT"
     assert tile.pixels[0, 0].tolist() == [4.0, 0.5, 0.25, 1.0]
+
+
+def test_float_image_marked_as_premultiplied():
+    image = bpy.data.images.new("float", 2, 2, alpha=True, float_buffer=True)
+    image.alpha_mode = "PREMUL"
+    assert read(image)[0].alpha == "PREMULTIPLIED"
 
 
 @pytest.mark.parametrize(("space", "srgb"), [("sRGB", True), ("Non-Color", False), ("Linear Rec.709", False)])

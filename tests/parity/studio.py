@@ -152,6 +152,10 @@ def ball(made=None, radius=0.5, smooth=True, rings=24, **place):
     faces += [(a + i, a + (i + 1) % n, len(vertices) - 1) for i in range(n)]
     made_object = mesh("ball", vertices, faces, made, **place)
     made_object.data.polygons.foreach_set("use_smooth", [smooth] * len(faces))
+    layer = made_object.data.uv_layers.new(name="UVMap")
+    for loop in made_object.data.loops:  # seen from above
+        x, y, _ = vertices[loop.vertex_index]
+        layer.uv[loop.index].vector = (0.5 + 0.5 * x / radius, 0.5 + 0.5 * y / radius)
     return made_object
 
 
