@@ -134,7 +134,8 @@ void WorldLight::refine(const Scene& scene, std::vector<float>& density, int wid
   const std::atomic<bool> go_on{false};
   pool.for_each(int(hot.size()), go_on, [&](int k) {
     const size_t texel = hot[size_t(k)];
-    const float s = std::sin(kPi * (float(texel / size_t(width)) + 0.5f) / float(height)), x0 = float(texel % size_t(width)), y0 = float(texel / size_t(width));
+    const float s = std::sin(kPi * (float(texel / size_t(width)) + 0.5f) / float(height)), x0 = float(texel % size_t(width)),
+                y0 = float(texel / size_t(width));
     // One row more on each side, so that every value knows its neighbours.
     constexpr int kRing = kFine + 2;
     float values[kRing * kRing], sum = 0;

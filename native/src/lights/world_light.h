@@ -52,7 +52,8 @@ class WorldLight {
     }
   };
   Texel texel_of(Vec2 p) const {
-    return {std::clamp(int(p.x * float(map_.width())), 0, map_.width() - 1), std::clamp(int(p.y * float(map_.height())), 0, map_.height() - 1)};
+    return {std::clamp(int(p.x * float(map_.width())), 0, map_.width() - 1),
+            std::clamp(int(p.y * float(map_.height())), 0, map_.height() - 1)};
   }
   const Distribution2D* refinement(Texel t) const {
     const int32_t i = fine_of_[size_t(t.y) * size_t(map_.width()) + size_t(t.x)];
