@@ -16,7 +16,7 @@ struct Cell {
   float t;
 };
 Cell cell(float x, int n) {
-  const float s = clamp01(x) * float(n - 1);
+  const float s = (x > 0.0f ? std::min(x, 1.0f) : 0.0f) * float(n - 1);  // what is not a number must not become an index
   const int i = std::min(int(s), n - 2);
   return {i, s - float(i)};
 }

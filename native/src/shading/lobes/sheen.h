@@ -9,7 +9,9 @@ namespace gi {
 struct Sheen {
   // The table is read once, for the view that the shading point has.
   Sheen(float roughness, float cos_o) {
-    const float y = std::clamp(roughness, 1e-3f, 1.0f) * (kSheenGrid - 1), x = clamp01(cos_o) * (kSheenGrid - 1);
+    // What is not a number must not become an index.
+    const float y = (roughness > 1e-3f ? std::min(roughness, 1.0f) : 1e-3f) * (kSheenGrid - 1);
+    const float x = (cos_o > 0.0f ? std::min(cos_o, 1.0f) : 0.0f) * (kSheenGrid - 1);
     const int i = std::min(int(y), kSheenGrid - 2), j = std::min(int(x), kSheenGrid - 2);
     const auto read = [&](const float (&t)[kSheenGrid][kSheenGrid]) {
       return lerp(lerp(t[i][j], t[i][j + 1], x - j), lerp(t[i + 1][j], t[i + 1][j + 1], x - j), y - i);
