@@ -75,7 +75,9 @@ def neutral(scene, samples: int):
         if hasattr(item, "shadow_terminator_geometry_offset"):
             item.shadow_terminator_geometry_offset = 0.0
     for item in bpy.data.lights:
-        item.cycles.is_caustics_light = False  # Cycles' manifold walks: caustics of lamps without a size, too dark elsewhere
+        item.cycles.is_caustics_light = (
+            False  # Cycles' manifold walks: caustics of lamps without a size, too dark elsewhere
+        )
     render.use_compositing = render.use_sequencer = render.use_border = render.use_motion_blur = False
     render.use_simplify = False
     render.threads_mode, render.threads = "FIXED", 2

@@ -2,6 +2,7 @@
 
 KNOWN: dict[str, str] = {
     "sky, Hosek-Wilkie": "not supported: Preetham's sky is shown, and a warning says so",
+    "armory_instancing": "its sky is Hosek and Wilkie's, see below",
     "closures / sheen microfiber": "the layer of fibres is fitted to its own random walks, up to 5 % from Cycles' table near its edge",
     "inputs / image premultiplied": "a byte image set to premultiplied after it was packed: our colours are divided by alpha once too often",
     "inputs on balls / image premultiplied": "a byte image set to premultiplied after it was packed: our colours are divided by alpha once too often",
