@@ -130,3 +130,16 @@ def test_folding_and_packing_change_nothing(steps):
     folded = emitted(build(lambda b: b.constant(1.0)))
     computed = emitted(build(lambda b: b.op("ray_kind", imm=(1,))))
     assert folded.tolist() == computed.tolist()
+
+
+@pytest.mark.parametrize("name", [name for name, op in sorted(TABLE.items()) if not op[1] and "f" in op[2]])
+def test_closures_of_what_is_not_a_number(name):
+    """One input after the other not a number, the others one half: run or refused."""
+    number, _, inputs, immediates = TABLE[name]
+    for broken in range(len(inputs)):
+        sources = [3 if k == broken else 0 for k in range(len(inputs))]
+        for immediate in range(4):
+            try:
+                run([number, *sources, *[immediate] * immediates], [0.5] * 3 + [np.nan] * 3, 16)
+            except ValueError as error:
+                assert "test" in str(error)

@@ -44,7 +44,8 @@ float f82_reflectance(float cos_i, float near, const FilmSubstrate& m) {
 }
 
 Complex sensitivity(float difference, int channel) {
-  const float x = std::min(difference * (1.0f / kThinFilmStep), 510.0f);
+  // What is not a number must not become an index.
+  const float x = difference > 0.0f ? std::min(difference * (1.0f / kThinFilmStep), 510.0f) : 0.0f;
   const int i = int(x);
   const float t = x - float(i), *a = kThinFilm[i] + 2 * channel, *b = kThinFilm[i + 1] + 2 * channel;
   return {lerp(a[0], b[0], t), lerp(a[1], b[1], t)};
