@@ -86,6 +86,12 @@ def line_of(row: dict) -> str:
         return f"| {row['name']} | – | – | {row['error']} |"
     good = not row["failed"] and not row["invalid"]
     verdict = "agrees" if good else f"**{row['failed']} of {row['blocks']} blocks differ**"
+    if row["ratio"] == 0:
+        verdict = "black in both: nothing is compared"
+    elif good and abs(row["ratio"] - 1) > max(4 * row["ratio_error"], 0.003):
+        verdict = (
+            f"every block does, but the mean is {abs(row['ratio'] - 1) / row['ratio_error']:.0f} standard errors off"
+        )
     if row["invalid"]:
         verdict += f", {row['invalid']} values not finite"
     if row["name"] in KNOWN:
