@@ -107,6 +107,14 @@ def test_every_pass_arrives_under_blenders_name(plane, rendered):
         owner, _, name = path.rpartition(".")
         setattr(getattr(layer, owner) if owner else layer, name, True)
     plane.cycles.samples = 2
+    matte = bpy.data.materials.new("Matte")
+    matte.use_nodes = True
+    tree = matte.node_tree
+    tree.nodes.clear()
+    shader, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
+    shader.inputs["Color"].default_value = (0.2, 0.4, 0.6, 1)
+    tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
+    next(item for item in plane.objects if item.type == "MESH").data.materials.append(matte)
     found = rendered(plane)
     for p in PASSES:
         assert found[f"ViewLayer.{p.blender_name}"].shape[2] == len(p.channels), p.name
@@ -114,7 +122,8 @@ def test_every_pass_arrives_under_blenders_name(plane, rendered):
     np.testing.assert_allclose(
         found["ViewLayer.Normal"], np.broadcast_to((0, 0, 1), found["ViewLayer.Normal"].shape), atol=1e-6
     )
-    np.testing.assert_allclose(found["ViewLayer.Denoising Albedo"], 0.8, rtol=1e-5)
+    albedo = found["ViewLayer.Denoising Albedo"]
+    np.testing.assert_allclose(albedo, np.broadcast_to((0.2, 0.4, 0.6), albedo.shape), rtol=1e-5)
     np.testing.assert_array_equal(found["ViewLayer.Debug Sample Count"], 2)
     assert set(engine.passes_of(layer)) == set(PASSES)
 
