@@ -112,7 +112,9 @@ def page(rows: dict, options) -> str:
         mine = [row for row in rows.values() if row["group"] == group]
         if not mine:
             continue
-        agreeing = sum("error" not in row and not row["failed"] and not row["invalid"] and row["ratio"] for row in mine)
+        agreeing = sum(
+            "error" not in row and not row["failed"] and not row["invalid"] and row["ratio"] != 0 for row in mine
+        )
         out += ["", f"## {title}: {agreeing} of {len(mine)} agree", "", "| | mean | worst | |", "|---|---|---|---|"]
         out += [line_of(row) for row in sorted(mine, key=lambda row: row["name"])]
     return "\n".join(out) + "\n"
