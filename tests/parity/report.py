@@ -34,9 +34,9 @@ def small_rows(pick) -> dict:
             continue
         try:
             for found in suite.agreements(name):
-                rows[found.name] = asdict(found) | {"group": "small"}
+                rows[f"small {found.name}"] = asdict(found) | {"group": "small"}
         except Exception as error:  # a row that says so is the point of the table
-            rows[name] = {"name": name, "group": "small", "error": str(error).splitlines()[0]}
+            rows[f"small {name}"] = {"name": name, "group": "small", "error": str(error).splitlines()[0]}
         print(name, flush=True)
     return rows
 
@@ -65,7 +65,7 @@ def shared_rows(options) -> dict:
             row = json.loads(lines[-1][4:]) if lines else row | {"error": failure(done)}
         except subprocess.TimeoutExpired:
             row["error"] = f"not done after {LIMIT} s"
-        rows[path.stem] = row
+        rows[f"shared {path.stem}"] = row
         print(
             path.stem,
             row.get("error") or f"{row['ratio']:.4f} ± {row['ratio_error']:.4f}, {row['failed']} of {row['blocks']}",
