@@ -15,6 +15,7 @@ import numpy as np
 
 from .. import native
 from ..scene_data import Image
+from .version import straight_floats_are_associated
 
 MAGENTA = (255, 0, 255, 255)
 SCENE_LINEAR = "Linear Rec.709"
@@ -76,9 +77,8 @@ def read_single(image, name: str, warn, path: str) -> Image:
         pixels = with_four_channels(np.array(pixels_of(image)), image)
         np.nan_to_num(pixels, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
         # What files hold is associated already, which Blender marks as PREMUL; Cycles multiplies what is marked STRAIGHT.
-        return Image(
-            name, pixels, alpha="PREMULTIPLIED" if image.alpha_mode == "PREMUL" and alpha == "STRAIGHT" else alpha
-        )
+        associated = image.alpha_mode == "PREMUL" or straight_floats_are_associated()
+        return Image(name, pixels, alpha="PREMULTIPLIED" if associated and alpha == "STRAIGHT" else alpha)
     encoded = with_four_channels(pixels_of(image), image)
     if space in (DATA, SCENE_LINEAR, "sRGB") and working_space() == SCENE_LINEAR:
         return Image(name, to_bytes(encoded), srgb=space == "sRGB", alpha=alpha)

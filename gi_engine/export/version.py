@@ -6,3 +6,8 @@ import bpy
 def voronoi_hashes_floats() -> bool:
     """Blender 5.0 changed the hash of Voronoi cells, and with it every pattern."""
     return bpy.app.version < (5, 0, 0)
+
+
+def straight_floats_are_associated() -> bool:
+    """Up to Blender 4.5 Cycles takes the colours of float images for multiplied by alpha, however they are marked."""
+    return bpy.app.version < (5, 0, 0)

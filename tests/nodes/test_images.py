@@ -64,7 +64,11 @@ def test_float_image_is_scene_linear():
     image = bpy.data.images.new("float", 2, 2, alpha=True, float_buffer=True)
     image.pixels.foreach_set(np.tile(np.array([4.0, 0.5, 0.25, 1.0], np.float32), 4))
     tile, warnings = read(image)
-    assert not warnings and tile.pixels.dtype == np.float32 and tile.alpha == "STRAIGHT"
+    assert (
+        not warnings
+        and tile.pixels.dtype == np.float32
+        and tile.alpha == ("STRAIGHT" if bpy.app.version >= (5, 0, 0) else "PREMULTIPLIED")
+    )
     assert tile.pixels[0, 0].tolist() == [4.0, 0.5, 0.25, 1.0]
 
 
