@@ -336,3 +336,21 @@ def test_any_number_of_threads_makes_the_same_image(integrator):
     assert images[0].std() > 0
     assert np.array_equal(images[0], images[1])
     assert np.array_equal(images[0], images[2])
+
+
+def test_samples_that_are_not_numbers_are_left_out():
+    """Half of every pixel is too bright for a float: what is left is the other half, not half as much."""
+    bright = quad((-1, -1, 0), (0, -1, 0), (0, 1, 0), (-1, 1, 0))
+    dim = quad((0, -1, 0), (1, -1, 0), (1, 1, 0), (0, 1, 0))
+    scene = scene_of((bright, surface(glow=3e38)), (dim, surface(glow=0.5)))
+    scene.camera = sd.Camera("camera", "ORTHO", looking((0, 0, 1), (0, 0, -1)), (-0.5, 0.5, -0.01, 0.01), 0.0, 1e6)
+    passes = ["Combined", "Emission", "Normal", "Debug Sample Count"]
+    scene.film = sd.Film(1, 4, filter="BOX", filter_width=1.0, exposure=2.0, passes=passes)
+    with Session(scene, sd.Settings("path", 64)) as session:
+        while not session.wait():
+            pass
+        assert 4 * 16 < session.progress()["bad_samples"] < 4 * 48
+        np.testing.assert_allclose(session.read("Combined"), np.broadcast_to([1, 1, 1, 1], (4, 1, 4)), rtol=1e-6)
+        np.testing.assert_allclose(session.read("Emission"), np.ones((4, 1, 3)), rtol=1e-6)
+        np.testing.assert_allclose(session.read("Normal"), np.broadcast_to([0, 0, 1], (4, 1, 3)), atol=1e-6)
+        assert (session.read("Debug Sample Count") == 64).all()

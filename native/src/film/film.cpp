@@ -7,8 +7,9 @@
 
 namespace gi {
 
-// Averaged over the samples, or of the first sample (indices and depth do not average).
-enum class Keep { kMean, kFirst };
+// Averaged over the samples whose light is a finite number, over all samples, or of the first sample (indices and depth
+// do not average).
+enum class Keep { kLight, kMean, kFirst };
 
 struct PassRule {
   const char* name;
@@ -25,7 +26,7 @@ void write_rgb(Rgb c, float* out) { out[0] = c.r, out[1] = c.g, out[2] = c.b; }
 void write_vec(Vec3 v, float* out) { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
 
 const PassRule kPassRules[] = {
-    {"Combined", 4, Keep::kMean, [](const PixelSample& s, float* o) { write_rgb(s.radiance, o), o[3] = s.alpha; }},
+    {"Combined", 4, Keep::kLight, [](const PixelSample& s, float* o) { write_rgb(s.radiance, o), o[3] = s.alpha; }},
     {"Depth", 1, Keep::kFirst, [](const PixelSample& s, float* o) { o[0] = s.depth; }},
     {"Position", 3, Keep::kFirst, [](const PixelSample& s, float* o) { write_vec(s.position, o); }},
     {"Normal", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_vec(s.normal, o); }},
@@ -34,8 +35,8 @@ const PassRule kPassRules[] = {
     {"Denoising Normal", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_vec(s.normal, o); }},
     {"Object Index", 1, Keep::kFirst, [](const PixelSample& s, float* o) { o[0] = s.object_index; }},
     {"Material Index", 1, Keep::kFirst, [](const PixelSample& s, float* o) { o[0] = s.material_index; }},
-    {"Emission", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_rgb(s.emission, o); }},
-    {"Environment", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_rgb(s.environment, o); }},
+    {"Emission", 3, Keep::kLight, [](const PixelSample& s, float* o) { write_rgb(s.emission, o); }},
+    {"Environment", 3, Keep::kLight, [](const PixelSample& s, float* o) { write_rgb(s.environment, o); }},
 };
 constexpr const char* kSampleCount = "Debug Sample Count";
 
@@ -71,7 +72,7 @@ Film::Film(FilmSpec spec) : spec_(std::move(spec)), filter_(spec_.filter, spec_.
     require(rule, "there is no pass named '" + name + "'");
     layers_.push_back({rule, std::vector<float>(pixels * size_t(rule->channels), 0.0f)});
   }
-  count_.assign(pixels, 0);
+  count_.assign(pixels, 0), light_count_.assign(pixels, 0);
   luminance_sum_.assign(pixels, 0.0f);
   luminance_square_sum_.assign(pixels, 0.0f);
 }
@@ -85,17 +86,19 @@ void Film::add_tile(int tile, int pass, const std::vector<PixelSample>& samples)
 }
 
 void Film::add_sample(size_t pixel, bool first, PixelSample s) {
-  if (!is_finite(s.radiance) || !std::isfinite(s.alpha)) {
-    // The sample still counts for the other passes' sake; its light is left out and the number of such samples reported.
-    s.radiance = Rgb(), s.alpha = std::isfinite(s.alpha) ? s.alpha : 1.0f;
-    ++bad_samples_;
-  }
-  s.radiance *= spec_.exposure, s.emission *= spec_.exposure, s.environment *= spec_.exposure;
   ++count_[pixel];
-  const float y = luminance(s.radiance);
-  luminance_sum_[pixel] += y;
-  luminance_square_sum_[pixel] += y * y;
+  s.radiance *= spec_.exposure, s.emission *= spec_.exposure, s.environment *= spec_.exposure;
+  const bool good = is_finite(s.radiance) && std::isfinite(s.alpha);
+  if (good) {
+    ++light_count_[pixel];
+    const float y = luminance(s.radiance);
+    luminance_sum_[pixel] += y;
+    luminance_square_sum_[pixel] += y * y;
+  } else {
+    ++bad_samples_;  // its light is left out of sums and counts; what it hit is still good
+  }
   for (Layer& layer : layers_) {
+    if (layer.rule->keep == Keep::kLight && !good) continue;
     float value[4];
     layer.rule->write(s, value);
     const int n = layer.rule->channels;
@@ -115,7 +118,8 @@ void Film::read(const std::string& pass, float* out) const {
   for (const Layer& l : layers_)
     if (pass == l.rule->name) layer = &l;
   require(layer || pass == kSampleCount, "the pass '" + pass + "' is not part of this render");
-  const bool mean = layer && layer->rule->keep == Keep::kMean;
+  const bool mean = layer && layer->rule->keep != Keep::kFirst;
+  const std::vector<uint32_t>& count = layer && layer->rule->keep == Keep::kLight ? light_count_ : count_;
   for (size_t tile = 0; tile < tiles_.size(); ++tile) {
     const Tile& t = tiles_[tile];
     const std::lock_guard lock(tile_mutex_[tile]);
@@ -127,7 +131,7 @@ void Film::read(const std::string& pass, float* out) const {
           continue;
         }
         const size_t c = size_t(layer->rule->channels);
-        const float scale = !mean ? 1.0f : count_[pixel] ? 1.0f / float(count_[pixel]) : 0.0f;
+        const float scale = !mean ? 1.0f : count[pixel] ? 1.0f / float(count[pixel]) : 0.0f;
         for (size_t k = 0; k < c; ++k) out[pixel * c + k] = layer->sum[pixel * c + k] * scale;
       }
     }
@@ -139,12 +143,13 @@ float Film::relative_error() const {
   double total = 0;
   for (size_t i = 0; i < pixels; ++i) {
     if (count_[i] < 2) return kInf;
-    total += luminance_sum_[i] / float(count_[i]);
+    total += luminance_sum_[i] / float(std::max(light_count_[i], 1u));
   }
   const float floor = std::max(float(0.1 * total / double(pixels)), 1e-12f);
   std::vector<float> error(pixels);
   for (size_t i = 0; i < pixels; ++i) {
-    const double n = count_[i], mean = luminance_sum_[i] / n;
+    if (light_count_[i] < 2) continue;  // no light to judge by: it would keep the render from ending
+    const double n = light_count_[i], mean = luminance_sum_[i] / n;
     const double variance = std::max(0.0, luminance_square_sum_[i] / n - mean * mean) * n / (n - 1);
     error[i] = float(std::sqrt(variance / n) / std::max(std::abs(mean), double(floor)));
   }
@@ -154,7 +159,7 @@ float Film::relative_error() const {
 }
 
 size_t Film::memory_bytes() const {
-  size_t bytes = count_.size() * 12;
+  size_t bytes = count_.size() * 16;
   for (const Layer& layer : layers_) bytes += layer.sum.size() * 4;
   return bytes;
 }

@@ -76,7 +76,7 @@ class Film {
   PixelFilter filter_;
   std::vector<Tile> tiles_;
   std::vector<Layer> layers_;
-  std::vector<uint32_t> count_;
+  std::vector<uint32_t> count_, light_count_;  // samples; those whose light is a finite number
   std::vector<float> luminance_sum_, luminance_square_sum_;
   std::unique_ptr<std::mutex[]> tile_mutex_;
   std::atomic<uint64_t> bad_samples_{0};
