@@ -1,7 +1,4 @@
-"""The Sky texture: Blender's scattering skies become a small image and the sun's disc, the older ones a formula. No bpy.
-
-Hosek and Wilkie's sky is left out (its data set is not ours to copy): Preetham's stands in for it.
-"""
+"""The Sky texture: Blender's scattering skies become a small image and the sun's disc, the older ones a formula. No bpy."""
 
 from __future__ import annotations
 
@@ -23,11 +20,27 @@ SMALLEST_SUN = 0.0005
 def sky_texture(b, direction):
     if b.node.sky_type in MULTIPLE + SINGLE:
         return scattering(b, direction)
-    if b.node.sky_type == "HOSEK_WILKIE":
-        b.warn("Hosek and Wilkie's sky is not supported; Preetham's is shown instead")
-    return b.op(
-        "sky_preetham", direction, imm=(b.table(preetham(tuple(b.node.sun_direction), b.node.turbidity)),), kind=COLOR
-    )
+    n = b.node
+    sun = unit(tuple(n.sun_direction))
+    if n.sky_type == "HOSEK_WILKIE":
+        return b.op(
+            "sky_hosek_wilkie", direction, imm=(b.table(hosek_wilkie(sun, n.turbidity, n.ground_albedo)),), kind=COLOR
+        )
+    return b.op("sky_preetham", direction, imm=(b.table(preetham(sun, n.turbidity)),), kind=COLOR)
+
+
+def unit(direction: tuple) -> np.ndarray:
+    return np.array(direction) / (np.linalg.norm(direction) or 1.0)
+
+
+# -------------------------------------------------------------------- Hosek and Wilkie
+
+
+def hosek_wilkie(sun: np.ndarray, turbidity: float, albedo: float) -> np.ndarray:
+    """The floats of the native SunnyHosekWilkieSky for a sun in the direction `sun`, at the horizon if it has set."""
+    theta = min(math.acos(min(max(sun[2], -1.0), 1.0)), math.pi / 2)
+    numbers = native.module().sky_hosek_wilkie(turbidity, albedo, math.pi / 2 - theta)
+    return np.array([theta, math.atan2(sun[0], sun[1]), *numbers], np.float32)
 
 
 # -------------------------------------------------------------------- scattering
@@ -80,10 +93,9 @@ ZENITH = (
 LUMINANCE_SCALE = 0.06  # Blender's: kcd/m2 to scene-linear
 
 
-def preetham(sun: tuple, turbidity: float) -> np.ndarray:
-    """The floats of the native PreethamSky for a sun in direction `sun`."""
-    sun = np.array(sun) / (np.linalg.norm(sun) or 1.0)
-    theta = math.acos(sun[2])
+def preetham(sun: np.ndarray, turbidity: float) -> np.ndarray:
+    """The floats of the native PreethamSky for a sun in the direction `sun`."""
+    theta = math.acos(min(max(sun[2], -1.0), 1.0))
     chi = (4.0 / 9.0 - turbidity / 120.0) * (math.pi - 2.0 * theta)
     luminance = ((4.0453 * turbidity - 4.9710) * math.tan(chi) - 0.2155 * turbidity + 2.4192) * LUMINANCE_SCALE
     powers = np.array([theta**3, theta**2, theta, 1.0])

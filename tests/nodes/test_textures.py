@@ -177,6 +177,15 @@ def sky_cases():
             yield Case(f"sky {kind} {elevation}", "Sky", settings, unit=True, tolerance=3e-3)
     settings = {"sky_type": "PREETHAM", "turbidity": 3.5, "sun_direction": (0.3, -0.5, 0.81)}
     yield Case("sky PREETHAM", "Sky", settings, unit=True, tolerance=1e-3)
+    suns = ((0.3, -0.5, 0.81), (0.9, 0.2, 0.05), (0.1, 0.1, 1.0), (-0.4, 0.7, -0.2))
+    for i, (turbidity, albedo) in enumerate(((1.0, 0.0), (2.2, 0.3), (6.7, 1.0), (10.0, 0.6))):
+        settings = {
+            "sky_type": "HOSEK_WILKIE",
+            "turbidity": turbidity,
+            "ground_albedo": albedo,
+            "sun_direction": suns[i],
+        }
+        yield Case(f"sky HOSEK_WILKIE {i}", "Sky", settings, unit=True, tolerance=1e-3)
 
 
 def mapping_cases():

@@ -3,8 +3,6 @@
 import bpy
 
 KNOWN: dict[str, str] = {
-    "sky, Hosek-Wilkie": "not supported: Preetham's sky is shown, and a warning says so",
-    "armory_instancing": "its sky is Hosek and Wilkie's, see below",
     "closures / sheen microfiber": "up to 5 % off near its edge; perhaps our own fit of the layer of fibres, not proven",
     "inputs / image premultiplied": "a byte image set to premultiplied after it was packed: our colours are divided by alpha once too often",
     "inputs on balls / image premultiplied": "a byte image set to premultiplied after it was packed: our colours are divided by alpha once too often",

@@ -86,6 +86,17 @@ nb::tuple sky(bool multiple, float sun_elevation, float sun_size, float altitude
   return nb::make_tuple(array, nb::make_tuple(sun.bottom.r, sun.bottom.g, sun.bottom.b), nb::make_tuple(sun.top.r, sun.top.g, sun.top.b));
 }
 
+// The 30 floats of a HosekWilkieSky.
+nb::list hosek_wilkie(float turbidity, float albedo, float sun_elevation) {
+  const HosekWilkieSky sky = hosek_wilkie_sky(turbidity, albedo, sun_elevation);
+  nb::list numbers;
+  for (const HosekWilkieSky::Channel& c : sky.xyz) {
+    numbers.append(c.radiance);
+    for (const float x : c.shape) numbers.append(x);
+  }
+  return numbers;
+}
+
 }  // namespace
 
 void bind_images(nb::module_& m) {
@@ -93,6 +104,8 @@ void bind_images(nb::module_& m) {
   m.def("sky", sky, nb::arg("multiple"), nb::arg("sun_elevation"), nb::arg("sun_size"), nb::arg("altitude"), nb::arg("air"),
         nb::arg("aerosol"), nb::arg("ozone"),
         "The table of a sky model, (H, W, 4) float32, and the sun's radiance at its lower and upper edge.");
+  m.def("sky_hosek_wilkie", hosek_wilkie, nb::arg("turbidity"), nb::arg("albedo"), nb::arg("sun_elevation"),
+        "Hosek and Wilkie's sky: for X, Y, Z each the mean radiance and nine shape parameters.");
 }
 
 std::unique_ptr<ShaderResources> read_resources(nb::handle scene) {

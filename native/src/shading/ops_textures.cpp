@@ -167,6 +167,11 @@ void preetham_texture(const Operands& a, ShadeState& s) {
   a.set(0, preetham(normalize_or(a.v(1), {0, 0, 1}), from_table<PreethamSky>(s, a.imm(2))));
 }
 
+// sky_hosek_wilkie(colour; direction; offset of a SunnyHosekWilkieSky)
+void hosek_wilkie_texture(const Operands& a, ShadeState& s) {
+  a.set(0, hosek_wilkie(normalize_or(a.v(1), {0, 0, 1}), from_table<SunnyHosekWilkieSky>(s, a.imm(2))));
+}
+
 constexpr Op kTextureOps[] = {
     {"noise", "fv", "vffffffff", 4, OpKind::kPure, noise},
     {"white_noise", "fv", "vf", 1, OpKind::kPure, white_noise},
@@ -183,6 +188,7 @@ constexpr Op kTextureOps[] = {
     {"environment", "vf", "v", 3, OpKind::kContext, environment_texture},
     {"sky", "v", "v", 2, OpKind::kContext, sky_texture},
     {"sky_preetham", "v", "v", 1, OpKind::kContext, preetham_texture},
+    {"sky_hosek_wilkie", "v", "v", 1, OpKind::kContext, hosek_wilkie_texture},
 };
 
 }  // namespace

@@ -37,6 +37,15 @@ SunDisc single_scattering_sun(float sun_elevation, float angular_diameter, const
 SkyTable multiple_scattering_sky(float sun_elevation, const Atmosphere& atmosphere);
 SunDisc multiple_scattering_sun(float sun_elevation, float angular_diameter, const Atmosphere& atmosphere);
 
+// [Hosek & Wilkie 2012], CIE XYZ. Turbidity in [1, 10]; a sun below the horizon counts as at it.
+struct HosekWilkieSky {
+  struct Channel {
+    float radiance;
+    float shape[9];
+  } xyz[3];
+};
+HosekWilkieSky hosek_wilkie_sky(float turbidity, float albedo, float sun_elevation);
+
 // CIE XYZ to linear Rec. 709 (IEC 61966-2-1).
 inline Rgb xyz_to_rec709(float x, float y, float z) {
   return {3.2404542f * x - 1.5371385f * y - 0.4985314f * z, -0.9692660f * x + 1.8760108f * y + 0.0415560f * z,
