@@ -354,3 +354,11 @@ def test_samples_that_are_not_numbers_are_left_out():
         np.testing.assert_allclose(session.read("Emission"), np.ones((4, 1, 3)), rtol=1e-6)
         np.testing.assert_allclose(session.read("Normal"), np.broadcast_to([0, 0, 1], (4, 1, 3)), atol=1e-6)
         assert (session.read("Debug Sample Count") == 64).all()
+
+
+def test_surfaces_in_the_same_place_do_not_shadow_one_another():
+    """Nor do rays that leave the one meet the other: the sky lights both as it lights one."""
+    corners = ((-1, -1, 0.3), (1, -1, -0.2), (1.3, 1.5, 0.1), (-0.7, 1, 0.6))
+    one = mesh(corners, [(0, 1, 2), (0, 2, 3)])
+    scene = scene_of((one, surface(0.6)), (mesh(corners, [(0, 1, 2), (0, 2, 3)]), surface(0.6)), world=1.0)
+    check(probe(scene, (0.1, 0.1, 2), (0, 0, -1)), 0.6)

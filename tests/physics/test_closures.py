@@ -1,9 +1,7 @@
 """Closures: the lobes of diffuse, cloth and cartoon shading, and the layers of the Principled BSDF, against physics and closed forms."""
 
-import importlib.util
-import sys
-
 import chi2
+import fibre_layer
 import numpy as np
 import pytest
 from gi_engine_native import _core
@@ -116,14 +114,10 @@ def test_diffuse_lobes_see_light_where_a_bumped_normal_turns_from_the_viewer():
 
 
 @pytest.mark.parametrize(("cos_o", "roughness"), [(0.95, 1.0), (0.37, 0.52), (0.2, 0.31), (0.09, 0.24)])
-def test_sheen_reflects_what_a_layer_of_fibres_does(root, cos_o, roughness):
+def test_sheen_reflects_what_a_layer_of_fibres_does(cos_o, roughness):
     """Off the table's grid, against a random walk through the fibres."""
-    spec = importlib.util.spec_from_file_location("fit_sheen", root / "native/tools/fit_sheen.py")
-    fit = importlib.util.module_from_spec(spec)
-    sys.modules["fit_sheen"] = fit
-    spec.loader.exec_module(fit)
-    w = fit.reflected(cos_o, roughness**2, np.random.default_rng(9))
-    truth, error = len(w) / fit.WALKS, np.sqrt(len(w)) / fit.WALKS
+    w = fibre_layer.reflected(cos_o, roughness**2, np.random.default_rng(9))
+    truth, error = len(w) / fibre_layer.WALKS, np.sqrt(len(w)) / fibre_layer.WALKS
     claimed = _core.lobe_albedo("sheen", {"roughness": [roughness], "cos_o": [cos_o]}, view(cos_o))[0, 0]
     assert abs(claimed - truth) < 4 * error + 0.015 * truth + 0.002
     # Light leaves towards the viewer's side, as far as the walk says.
