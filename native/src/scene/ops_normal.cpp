@@ -19,18 +19,14 @@ void set_or_keep(const Operands& o, const ShadeState& s, Vec3 n) { o.set(0, n ==
 // colour, strength; UV slot, green goes down. The frame is that of the UV map, about the interpolated normal.
 void normal_map_tangent(const Operands& o, ShadeState& s) {
   const ShadingPoint& p = s.point;
-  Vec3 du, dv;
-  const Instance* instance = instance_of(s);
-  if (!instance || !s.resources.scene->uv_tangents(p, o.imm(3), du, dv)) return o.set(0, p.ns);
+  const auto tangent = instance_of(s) ? s.resources.scene->uv_tangent(p, o.imm(3)) : std::nullopt;
+  if (!tangent) return o.set(0, p.ns);
   Vec3 c = map_color(o, 1, o.imm(4) != 0);
   const float strength = o.f(2);
   c = {c.x * strength, c.y * strength, lerp(1.0f, c.z, clamp01(strength))};
   // In object space, where the normal is as it was before it was turned towards the viewer.
-  const Vec3 n = normal_to_object(s, p.backfacing ? -p.ns : p.ns);
-  du = instance->to_object.vector(du), dv = instance->to_object.vector(dv);
-  const Vec3 tangent = normalize(du - n * dot(n, du));
-  const float side = dot(cross(n, tangent), dv) < 0.0f ? -1.0f : 1.0f;
-  const Vec3 mapped = normal_to_world(s, normalize(c.x * tangent + c.y * side * cross(n, tangent) + c.z * n));
+  const Vec3 n = normal_to_object(s, p.backfacing ? -p.ns : p.ns), t = tangent->direction;
+  const Vec3 mapped = normal_to_world(s, normalize(c.x * t + c.y * tangent->side * cross(n, t) + c.z * n));
   set_or_keep(o, s, p.backfacing ? -mapped : mapped);
 }
 
@@ -131,12 +127,9 @@ void vector_displacement(const Operands& o, ShadeState& s) {
   const Instance* i = instance_of(s);
   if (!i || o.imm(5) == 2) return o.set(0, d);
   if (o.imm(5) == 0) {
-    Vec3 du, dv;
     const Vec3 n = normal_to_object(s, s.point.ns);
-    if (!s.resources.scene->uv_tangents(s.point, o.imm(4), du, dv)) du = Frame::from_normal(n).x, dv = Frame::from_normal(n).y;
-    const Vec3 t = normalize(i->to_object.vector(du)),
-               b = normalize(cross(n, t)) * (dot(cross(n, t), i->to_object.vector(dv)) < 0.0f ? -1.0f : 1.0f);
-    d = t * d.x + n * d.y + b * d.z;
+    const CornerTangent t = s.resources.scene->uv_tangent(s.point, o.imm(4)).value_or(CornerTangent{Frame::from_normal(n).x, 1.0f});
+    d = t.direction * d.x + n * d.y + normalize(cross(n, t.direction)) * (t.side * d.z);
   }
   o.set(0, i->to_world.vector(d));
 }
@@ -146,10 +139,10 @@ void vector_displacement(const Operands& o, ShadeState& s) {
 // In the plane of the shading normal; zero where `t` says nothing.
 Vec3 along_surface(const ShadeState& s, Vec3 t) { return cross(s.point.ns, normalize(cross(t, s.point.ns))); }
 
+// Cycles turns it as a normal, not as a direction.
 void tangent_uv(const Operands& o, ShadeState& s) {
-  Vec3 du, dv;
-  if (!instance_of(s) || !s.resources.scene->uv_tangents(s.point, o.imm(1), du, dv)) return o.set(0, Vec3{});
-  o.set(0, along_surface(s, du));
+  const auto tangent = instance_of(s) ? s.resources.scene->uv_tangent(s.point, o.imm(1)) : std::nullopt;
+  o.set(0, tangent ? along_surface(s, normal_to_world(s, tangent->direction)) : Vec3{});
 }
 
 // generated coordinates; axis to turn about

@@ -23,8 +23,9 @@ Vec3 corner_normal(const MeshData& mesh, uint32_t triangle, int k) {
 Scene::Scene(SceneData data, std::unique_ptr<ShaderResources> resources, const std::string& embree, int threads)
     : data_(std::move(data)), resources_(std::move(resources)) {
   resources_->scene = this;
-  place_meshes();
   resolve_attributes();
+  make_tangents();  // in object space, so before meshes are placed
+  place_meshes();
   build_accel(embree, threads);
 }
 
@@ -79,6 +80,47 @@ void Scene::resolve_attributes() {
   }
 }
 
+void Scene::make_tangents() {
+  // Which op takes tangents of the map in which of its immediates.
+  static constexpr std::pair<std::string_view, int> kUsers[] = {{"normal_map_tangent", 0}, {"tangent_uv", 0}, {"vector_displacement", 0}};
+  tangents_.resize(data_.meshes.size());
+  for (const InstanceData& i : data_.instances) {
+    for (const int32_t material : i.materials) {
+      for (const auto& [op, immediate] : kUsers) {
+        for (const int32_t slot : data_.materials[size_t(material)].program.immediates(op, immediate)) {
+          tangents_[i.mesh].resize(data_.attribute_names.size());
+          std::vector<CornerTangent>& made = tangents_[i.mesh][size_t(slot)];
+          if (made.empty()) made = tangents_of(i.mesh, slot);
+        }
+      }
+    }
+  }
+}
+
+std::vector<CornerTangent> Scene::tangents_of(uint32_t m, int slot) const {
+  const MeshData& mesh = data_.meshes[m];
+  const int32_t index = attribute_index_[m][size_t(slot)];
+  if (index < 0 && !data_.attribute_names[size_t(slot)].empty()) return {};
+  std::vector<TangentCorner> corners(mesh.tri_corner.size);
+  ShadingPoint point;
+  for (size_t c = 0; c < corners.size(); ++c) {
+    const float* p = mesh.positions.data + 3 * size_t(mesh.corner_vert[size_t(mesh.tri_corner[c])]);
+    corners[c].position = {p[0], p[1], p[2]};
+    corners[c].uv = spherical_uv(corners[c].position);
+    if (index < 0) continue;
+    float uv[4];
+    point.triangle = uint32_t(c / 3), point.b1 = c % 3 == 1, point.b2 = c % 3 == 2;
+    interpolate(mesh, mesh.attributes[size_t(index)], point, uv);
+    corners[c].uv = {uv[0], uv[1]};
+  }
+  for (size_t c = 0; c < corners.size(); c += 3) {
+    const Vec3 a = corners[c].position, flat = normalize(cross(corners[c + 1].position - a, corners[c + 2].position - a));
+    for (size_t k = 0; k < 3; ++k)
+      corners[c + k].normal = mesh.normals_domain == Domain::kFace ? flat : corner_normal(mesh, uint32_t(c / 3), int(k));
+  }
+  return corner_tangents(corners);
+}
+
 void Scene::build_accel(const std::string& embree, int threads) {
   indices_.resize(data_.meshes.size());
   std::vector<AccelMesh> meshes;
@@ -108,6 +150,8 @@ size_t Scene::memory_bytes() const {
     bytes += (m.positions.size + m.corner_vert.size + 2 * m.tri_corner.size + m.tri_face.size + m.face_material.size + m.normals.size) * 4;
     for (const AttributeData& a : m.attributes) bytes += a.data.size * 4;
   }
+  for (const auto& slots : tangents_)
+    for (const auto& corners : slots) bytes += corners.size() * sizeof(CornerTangent);
   return bytes;
 }
 
@@ -335,22 +379,15 @@ void Scene::interpolate(const MeshData& mesh, const AttributeData& a, const Shad
   std::copy_n(sum, n, out);
 }
 
-bool Scene::uv_tangents(const ShadingPoint& point, int slot, Vec3& dp_du, Vec3& dp_dv) const {
-  if (point.instance == kNoId) return false;
-  ShadingPoint corner = point;
-  float uv[3][4];
-  for (int k = 0; k < 3; ++k) {
-    corner.b1 = k == 1, corner.b2 = k == 2;
-    if (!attribute(corner, slot, uv[k])) return false;
-  }
-  Vec3 v[3];
-  triangle_vertices(point.instance, point.triangle, v);
-  const float du1 = uv[1][0] - uv[0][0], dv1 = uv[1][1] - uv[0][1], du2 = uv[2][0] - uv[0][0], dv2 = uv[2][1] - uv[0][1];
-  const float det = du1 * dv2 - dv1 * du2;
-  if (det == 0.0f) return false;
-  dp_du = ((v[1] - v[0]) * dv2 - (v[2] - v[0]) * dv1) / det;
-  dp_dv = ((v[2] - v[0]) * du1 - (v[1] - v[0]) * du2) / det;
-  return length_squared(dp_du) > 0.0f && length_squared(dp_dv) > 0.0f;
+std::optional<CornerTangent> Scene::uv_tangent(const ShadingPoint& point, int slot) const {
+  if (point.instance == kNoId) return {};
+  const std::vector<std::vector<CornerTangent>>& slots = tangents_[point.mesh];
+  if (slots.empty() || slots[size_t(slot)].empty()) return {};
+  const CornerTangent* corner = slots[size_t(slot)].data() + 3 * size_t(point.triangle);
+  const float w[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
+  CornerTangent sum{Vec3{}, 0.0f};
+  for (int k = 0; k < 3; ++k) sum.direction += w[k] * corner[k].direction, sum.side += w[k] * corner[k].side;
+  return sum;
 }
 
 }  // namespace gi

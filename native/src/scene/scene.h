@@ -4,10 +4,12 @@
 #include <array>
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "scene/accel.h"
 #include "scene/scene_data.h"
+#include "scene/tangents.h"
 #include "shading/program.h"
 #include "shading/resources.h"
 
@@ -68,8 +70,9 @@ class Scene {
   // and instancer attributes. Returns how many components it has; 0 if the object has none. Missing components: 0, alpha 1.
   int attribute(const ShadingPoint& point, int slot, float out[4]) const;
   bool active_uv(const ShadingPoint& point, float out[4]) const;  // the UV map that renders by default
-  // Directions ∂P/∂u, ∂P/∂v of a UV map over the surface, world space. False if there is none or it is degenerate.
-  bool uv_tangents(const ShadingPoint& point, int slot, Vec3& dp_du, Vec3& dp_dv) const;
+  // The tangent of the UV map in slot `slot`, interpolated but not made unit, object space. For the slots that ops of the
+  // object's materials take tangents of; null if the object has no such map.
+  std::optional<CornerTangent> uv_tangent(const ShadingPoint& point, int slot) const;
 
   std::string embree_description() const { return accel_->description(); }
   size_t memory_bytes() const;  // geometry and acceleration structure
@@ -85,6 +88,8 @@ class Scene {
 
   void place_meshes();
   void resolve_attributes();
+  void make_tangents();
+  std::vector<CornerTangent> tangents_of(uint32_t mesh, int slot) const;
   void build_accel(const std::string& embree, int threads);
   Vec3 vertex(const Instance& instance, uint32_t v) const;
   void interpolate(const MeshData& mesh, const AttributeData& attribute, const ShadingPoint& point, float out[4]) const;
@@ -92,6 +97,7 @@ class Scene {
   SceneData data_;
   std::vector<Instance> instances_;
   std::vector<std::vector<int32_t>> attribute_index_;  // per mesh and slot: which of its attributes, or -1
+  std::vector<std::vector<std::vector<CornerTangent>>> tangents_;  // per mesh and slot: of each corner of its triangles, or none
   std::vector<int32_t> active_uv_;                     // per mesh: which attribute, or -1
   std::vector<std::vector<uint32_t>> indices_;         // per mesh: Embree's index buffer
   std::unique_ptr<ShaderResources> resources_;

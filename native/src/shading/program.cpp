@@ -61,6 +61,14 @@ void Program::check() const {
   for (const size_t target : targets) require(starts[target], who + "a jump lands inside an instruction");
 }
 
+std::vector<int32_t> Program::immediates(std::string_view name, int index) const {
+  std::vector<int32_t> found;
+  for_each_instruction(code_, [&](size_t, const Instruction& i) {
+    if (i.op.name == name) found.push_back(i.operands[i.op.width() - 1 - i.op.immediates + index]);
+  });
+  return found;
+}
+
 void Program::run(ShadingPoint& point, const ShaderResources& resources, Bsdf* bsdf) const {
   float registers[kMaxRegisters + 2];
   std::copy(constants_.begin(), constants_.end(), registers);

@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/vec.h"
@@ -94,6 +95,8 @@ class Program {
   bool has_transparency() const { return effects_ & kAddsTransparency; }
   bool has_emission() const { return effects_ & kAddsEmission; }
   bool empty() const { return code_.empty(); }
+  // Immediate `index` of every call of op `name`: what the program will ask of its surroundings.
+  std::vector<int32_t> immediates(std::string_view name, int index) const;
   // True if what it computes does not depend on the point: no context op is left.
   bool is_constant() const { return constant_; }
 
