@@ -16,6 +16,7 @@ from .session import UPDATE_SECONDS, RenderFailed, Session
 
 WHOLE = 1 << 16  # begin_result clamps it to the border's size
 PREVIEW_SAMPLES = 32
+CONSOLE_SECONDS = 5.0  # without a window, every status is a line on the console
 USER_ERRORS = (ExportError, RenderFailed, native.NativeMissing)
 
 # Said once in an animation, not once a frame.
@@ -33,6 +34,7 @@ class GIEngine(bpy.types.RenderEngine):
     # Class attributes rather than __init__, whose arguments differ between versions.
     exported: Exported | None = None
     failure: Exception | None = None
+    next_status: float = 0.0
 
     def update(self, data=None, depsgraph=None):
         # Blender holds still here (under its draw lock), so here is where the scene is read.
@@ -111,6 +113,7 @@ class GIEngine(bpy.types.RenderEngine):
             self.tell(session.progress())
         self.show(session, result)
         progress = session.progress()
+        self.next_status = 0.0
         self.tell(progress)
         if progress["bad_samples"]:
             self.warn(f"{progress['bad_samples']} samples were not finite numbers and were left out")
@@ -131,7 +134,9 @@ class GIEngine(bpy.types.RenderEngine):
         noise = progress["noise"] if math.isfinite(progress["noise"]) else None
         memory = progress["memory"] / 2**20
         self.update_memory_stats(memory_used=memory, memory_peak=memory)
-        self.update_stats("", status(progress, left))
+        if not bpy.app.background or time.monotonic() >= self.next_status:
+            self.next_status = time.monotonic() + CONSOLE_SECONDS
+            self.update_stats("", status(progress, left))
         control.report(
             control.Progress(
                 stage="Render",

@@ -16,20 +16,19 @@ NOT_OURS = {
     "DATA_PT_spot",
     "NODE_DATA_PT_light",
     "RENDER_PT_freestyle",
-    "RENDER_PT_post_processing",
     "RENDER_PT_simplify",
-    "RENDER_PT_stamp",
-    "SCENE_PT_audio",
+    "RENDER_PT_simplify_greasepencil",
+    "RENDER_PT_simplify_render",
+    "RENDER_PT_simplify_viewport",
     "VIEWLAYER_PT_layer_passes",
 }
-# Panels that only EEVEE claims but that show data we read.
+# Panels that not every engine has but that show data we read.
 FROM_EEVEE = {
     "DATA_PT_camera_dof",
     "DATA_PT_camera_dof_aperture",
     "EEVEE_MATERIAL_PT_context_material",
-    "EEVEE_MATERIAL_PT_surface",
-    "EEVEE_WORLD_PT_surface",
     "MATERIAL_PT_preview",
+    "OBJECT_PT_shadow_terminator",
     "WORLD_PT_context_world",
 }
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..export.shaders import has_nodes
 from .panel import Panel, columns
 
 
@@ -77,6 +78,22 @@ def draw_cycles(column, owner, names) -> None:
             column.prop(owner, name)
 
 
+def draw_nodes(layout, owner, socket: str, plain: str = "") -> None:
+    """The tree that ends in a socket of the output that Cycles and we render, which need not be EEVEE's.
+    `plain` is the property that counts where there is no tree, and no other panel shows."""
+    layout.use_property_split = True
+    if not has_nodes(owner):
+        layout.prop(owner, "use_nodes", icon="NODETREE")
+        if plain:
+            layout.prop(owner, plain)
+        return
+    output = owner.node_tree.get_output_node("CYCLES")
+    if output:
+        layout.template_node_view(owner.node_tree, output, output.inputs[socket])
+    else:
+        layout.label(text="No output node")
+
+
 class GI_LIGHT_PT_nodes(Panel, bpy.types.Panel):
     bl_label = "Nodes"
     bl_context = "data"
@@ -86,62 +103,108 @@ class GI_LIGHT_PT_nodes(Panel, bpy.types.Panel):
         return super().poll(context) and context.light is not None
 
     def draw(self, context):
-        from bl_ui.properties_material import panel_node_draw  # bl_ui is there only once Blender runs
-
-        light = context.light
-        if not light.use_nodes:
-            self.layout.prop(light, "use_nodes", icon="NODETREE")
-        else:
-            self.layout.use_property_split = True
-            panel_node_draw(self.layout, light, "OUTPUT_LIGHT", "Surface")
+        draw_nodes(self.layout, context.light, "Surface")
 
 
-class GI_OBJECT_PT_visibility(Panel, bpy.types.Panel):
-    bl_label = "Ray Visibility"
-    bl_context = "object"
+class MaterialPanel(Panel):
+    bl_context = "material"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.material is not None and not context.material.grease_pencil
+
+
+class GI_MATERIAL_PT_surface(MaterialPanel, bpy.types.Panel):
+    bl_label = "Surface"
+
+    def draw(self, context):
+        draw_nodes(self.layout, context.material, "Surface", "diffuse_color")
+
+
+class GI_MATERIAL_PT_displacement(MaterialPanel, bpy.types.Panel):
+    bl_label = "Displacement"
     bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and context.object is not None
+        return super().poll(context) and has_nodes(context.material)
+
+    def draw(self, context):
+        draw_nodes(self.layout, context.material, "Displacement")
+
+
+class GI_WORLD_PT_surface(Panel, bpy.types.Panel):
+    bl_label = "Surface"
+    bl_context = "world"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.world is not None
+
+    def draw(self, context):
+        draw_nodes(self.layout, context.world, "Surface", "color")
+
+
+GEOMETRY = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD", "VOLUME"}
+
+
+class GI_OBJECT_PT_visibility(Panel, bpy.types.Panel):
+    bl_label = "Ray Visibility"
+    bl_parent_id = "OBJECT_PT_visibility"
+    bl_context = "object"
+
+    @classmethod
+    def poll(cls, context):
+        item = context.object
+        return super().poll(context) and item is not None and (item.type in GEOMETRY | {"LIGHT"} or item.is_instancer)
 
     def draw(self, context):
         item = context.object
+        names = ["camera", "diffuse", "glossy", "transmission", "shadow"]
+        if item.type == "LIGHT":
+            names.remove("shadow")
         column = columns(self.layout)
-        for name in ("camera", "diffuse", "glossy", "transmission", "shadow"):
+        for name in names:
             column.prop(item, f"visible_{name}", text=name.title())
-        column = columns(self.layout)
-        column.prop(item, "is_holdout")
+        if item.type != "LIGHT":
+            columns(self.layout, heading="Mask").prop(item, "is_holdout")
 
 
-class GI_WORLD_PT_settings(Panel, bpy.types.Panel):
-    bl_label = "Settings"
+class WorldPanel(Panel):
+    """What Cycles keeps of a world, where its add-on is switched on."""
+
     bl_context = "world"
-    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context):
         return super().poll(context) and getattr(context.world, "cycles", None) is not None
 
-    def draw(self, context):
-        world = context.world
-        column = columns(self.layout)
-        draw_cycles(column, world.cycles, ("sampling_method",))
-        if getattr(world.cycles, "sampling_method", "") == "MANUAL":
-            draw_cycles(column, world.cycles, ("sample_map_resolution",))
-        draw_cycles(column, world.cycles, ("max_bounces",))
-        column = columns(self.layout)
-        draw_cycles(column, getattr(world, "cycles_visibility", None), ("camera", "diffuse", "glossy", "transmission"))
 
-
-class GI_MATERIAL_PT_settings(Panel, bpy.types.Panel):
+class GI_WORLD_PT_settings(WorldPanel, bpy.types.Panel):
     bl_label = "Settings"
-    bl_context = "material"
     bl_options = {"DEFAULT_CLOSED"}
 
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.material is not None
+    def draw(self, context):
+        cycles = context.world.cycles
+        column = columns(self.layout)
+        draw_cycles(column, cycles, ("sampling_method",))
+        if getattr(cycles, "sampling_method", "") == "MANUAL":
+            draw_cycles(column, cycles, ("sample_map_resolution",))
+        draw_cycles(column, cycles, ("max_bounces",))
+
+
+class GI_WORLD_PT_visibility(WorldPanel, bpy.types.Panel):
+    bl_label = "Ray Visibility"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        visibility = getattr(context.world, "cycles_visibility", None)
+        draw_cycles(columns(self.layout), visibility, ("camera", "diffuse", "glossy", "transmission"))
+
+
+class GI_MATERIAL_PT_settings(MaterialPanel, bpy.types.Panel):
+    bl_label = "Settings"
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
         material = context.material
@@ -151,11 +214,40 @@ class GI_MATERIAL_PT_settings(Panel, bpy.types.Panel):
         draw_cycles(column, getattr(material, "cycles", None), ("emission_sampling", "use_bump_map_correction"))
 
 
+PROJECTION = ("longitude_min", "longitude_max", "latitude_min", "latitude_max")
+
+
+class GI_CAMERA_PT_panorama(Panel, bpy.types.Panel):
+    """Blender's lens panel shows the panoramas of Cycles only while that is the engine."""
+
+    bl_label = "Panorama"
+    bl_parent_id = "DATA_PT_lens"
+    bl_context = "data"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.camera is not None and context.camera.type == "PANO"
+
+    def draw(self, context):
+        camera = context.camera
+        column = columns(self.layout)
+        column.prop(camera, "panorama_type")
+        if camera.panorama_type != "EQUIRECTANGULAR":
+            column.label(text="Rendered as equirectangular", icon="INFO")
+        for name in PROJECTION:
+            column.prop(camera, name)
+
+
 CLASSES = (
+    GI_CAMERA_PT_panorama,
     GI_LIGHT_PT_light,
     GI_LIGHT_PT_nodes,
-    GI_OBJECT_PT_visibility,
-    GI_WORLD_PT_settings,
+    GI_MATERIAL_PT_surface,
+    GI_MATERIAL_PT_displacement,
     GI_MATERIAL_PT_settings,
+    GI_OBJECT_PT_visibility,
+    GI_WORLD_PT_surface,
+    GI_WORLD_PT_settings,
+    GI_WORLD_PT_visibility,
 )
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

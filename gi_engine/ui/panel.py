@@ -21,10 +21,10 @@ class RenderPanel(Panel):
     bl_context = "render"
 
 
-def columns(layout):
+def columns(layout, heading: str = ""):
     layout.use_property_split = True
     layout.use_property_decorate = False
-    return layout.column()
+    return layout.column(heading=heading)
 
 
 def setting(layout, scene, name: str, **options) -> None:

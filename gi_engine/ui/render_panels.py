@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import native
-from ..export.settings import SHARED
+from ..export.settings import SHARED, value_of
 from .panel import Panel, RenderPanel, columns, has_setting, setting
 
 BOUNCES = (
@@ -42,9 +42,18 @@ class GI_RENDER_PT_integrator(RenderPanel, bpy.types.Panel):
         own = getattr(scene.gi_engine, scene.gi_engine.integrator, None)
         for parameter in parameters(scene):
             if parameter["name"] not in SHARED:
-                column.prop(own, parameter["name"])
+                row = column.row()
+                row.active = matters(own, parameter["name"])
+                row.prop(own, parameter["name"])
             elif parameter["name"] == "light_threshold":
                 setting(column, scene, "light_threshold")
+
+
+def matters(own, name: str) -> bool:
+    """A parameter that is named "choice_item" matters only while that item of the enum `choice` is chosen."""
+    choice, _, item = name.rpartition("_")
+    found = own.bl_rna.properties.get(choice)
+    return found is None or item.upper() not in found.enum_items or getattr(own, choice) == item.upper()
 
 
 class GI_RENDER_PT_sampling(RenderPanel, bpy.types.Panel):
@@ -59,11 +68,14 @@ class GI_RENDER_PT_sampling(RenderPanel, bpy.types.Panel):
         row = column.row(align=True)
         setting(row, scene, "seed")
         setting(row, scene, "use_animated_seed", text="", icon="TIME")
+        if not hasattr(scene, "cycles"):  # its add-on is switched off
+            return
         if scene.gi_engine.is_own:
-            column.operator("gi_engine.copy_from_cycles")
-            column.operator("gi_engine.follow_cycles")
+            row = column.row(align=True)
+            row.operator("gi_engine.copy_from_cycles")
+            row.operator("gi_engine.follow_cycles")
         else:
-            column.label(text="Shared with Cycles until changed here", icon="LINKED")
+            column.label(text="Settings are shared with Cycles", icon="LINKED")
             column.operator("gi_engine.copy_from_cycles", text="Make Own Settings")
 
 
@@ -76,12 +88,59 @@ class GI_RENDER_PT_light_paths(RenderPanel, bpy.types.Panel):
         return super().poll(context) and has_any(context.scene, BOUNCES + CLAMPING + CAUSTICS)
 
     def draw(self, context):
-        names = {p["name"] for p in parameters(context.scene)}
-        for group in (BOUNCES, CLAMPING, CAUSTICS):
+        pass
+
+
+class LightPathPanel(RenderPanel):
+    """A group of the chosen integrator's parameters that Cycles has too."""
+
+    bl_parent_id = "GI_RENDER_PT_light_paths"
+    names: tuple[str, ...]
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and has_any(context.scene, cls.names)
+
+    def draw(self, context):
+        chosen = {p["name"] for p in parameters(context.scene)}
+        column = columns(self.layout)
+        for name in self.names:
+            if name in chosen and has_setting(context.scene, name):
+                setting(column, context.scene, name)
+
+
+class GI_RENDER_PT_bounces(LightPathPanel, bpy.types.Panel):
+    bl_label = "Max Bounces"
+    names = BOUNCES
+
+
+class GI_RENDER_PT_clamping(LightPathPanel, bpy.types.Panel):
+    bl_label = "Clamping"
+    names = CLAMPING
+
+
+class GI_RENDER_PT_caustics(LightPathPanel, bpy.types.Panel):
+    bl_label = "Caustics"
+    names = CAUSTICS
+
+
+class GI_RENDER_PT_simplify(RenderPanel, bpy.types.Panel):
+    """Blender's own would come before everything else."""
+
+    bl_label = "Simplify"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "use_simplify", text="")
+
+    def draw(self, context):
+        render = context.scene.render
+        for heading, suffix in (("Viewport", ""), ("Render", "_render")):
             column = columns(self.layout)
-            for name in group:
-                if name in names and has_setting(context.scene, name):
-                    setting(column, context.scene, name)
+            column.active = render.use_simplify
+            column.label(text=heading)
+            column.prop(render, f"simplify_subdivision{suffix}", text="Max Subdivision")
+            column.prop(render, f"simplify_child_particles{suffix}", text="Child Particles")
 
 
 class GI_RENDER_PT_film(RenderPanel, bpy.types.Panel):
@@ -89,17 +148,34 @@ class GI_RENDER_PT_film(RenderPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
+        setting(columns(self.layout), context.scene, "film_exposure")
+
+
+class GI_RENDER_PT_pixel_filter(RenderPanel, bpy.types.Panel):
+    bl_label = "Pixel Filter"
+    bl_parent_id = "GI_RENDER_PT_film"
+
+    def draw(self, context):
+        column = columns(self.layout)
+        setting(column, context.scene, "pixel_filter", text="Type")
+        setting(column, context.scene, "filter_width", text="Width")
+
+
+class GI_RENDER_PT_transparent(RenderPanel, bpy.types.Panel):
+    bl_label = "Transparent"
+    bl_parent_id = "GI_RENDER_PT_film"
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "film_transparent", text="")
+
+    def draw(self, context):
         scene = context.scene
         column = columns(self.layout)
-        setting(column, scene, "film_exposure")
-        setting(column, scene, "pixel_filter")
-        setting(column, scene, "filter_width")
-        column = columns(self.layout)
-        column.prop(scene.render, "film_transparent", text="Transparent")
-        column = column.column()
         column.active = scene.render.film_transparent
         setting(column, scene, "transparent_glass")
-        setting(column, scene, "transparent_roughness")
+        row = column.row()
+        row.active = value_of(scene, "transparent_glass")
+        setting(row, scene, "transparent_roughness")
 
 
 class GI_RENDER_PT_performance(RenderPanel, bpy.types.Panel):
@@ -115,23 +191,36 @@ class GI_RENDER_PT_performance(RenderPanel, bpy.types.Panel):
         row.prop(render, "threads")
 
 
+class GI_RENDER_PT_compositor(RenderPanel, bpy.types.Panel):
+    bl_label = "Compositor"
+    bl_parent_id = "GI_RENDER_PT_performance"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        render = context.scene.render
+        column = columns(self.layout)
+        column.row().prop(render, "compositor_device", text="Device", expand=True)
+        if render.compositor_device == "GPU":
+            column.prop(render, "compositor_precision", text="Precision")
+
+
 class GI_VIEWLAYER_PT_passes(Panel, bpy.types.Panel):
     bl_label = "Passes"
     bl_context = "view_layer"
 
     def draw(self, context):
         layer = context.view_layer
-        column = columns(self.layout)
+        column = columns(self.layout, heading="Data")
         for name in ("use_pass_z", "use_pass_normal", "use_pass_position", "use_pass_uv"):
             column.prop(layer, name)
-        column = columns(self.layout)
+        column.prop(layer.gi_engine, "use_pass_sample_count")
+        column = columns(self.layout, heading="Indexes")
         for name in ("use_pass_object_index", "use_pass_material_index"):
             column.prop(layer, name)
-        column = columns(self.layout)
+        column = columns(self.layout, heading="Light")
         for name in ("use_pass_emit", "use_pass_environment"):
             column.prop(layer, name)
-        for name in ("use_pass_albedo", "use_pass_sample_count"):
-            column.prop(layer.gi_engine, name)
+        column.prop(layer.gi_engine, "use_pass_albedo")
 
 
 class GI_VIEWLAYER_PT_override(Panel, bpy.types.Panel):
@@ -146,7 +235,7 @@ class GI_VIEWLAYER_PT_override(Panel, bpy.types.Panel):
         if hasattr(layer, "world_override"):  # from 5.0 on
             column.prop(layer, "world_override")
         column.prop(layer, "samples")
-        column = columns(self.layout)
+        column = columns(self.layout, heading="Include")
         column.prop(layer, "use_sky", text="Environment")
         column.prop(layer, "use_solid", text="Surfaces")
 
@@ -155,8 +244,15 @@ CLASSES = (
     GI_RENDER_PT_integrator,
     GI_RENDER_PT_sampling,
     GI_RENDER_PT_light_paths,
+    GI_RENDER_PT_bounces,
+    GI_RENDER_PT_clamping,
+    GI_RENDER_PT_caustics,
+    GI_RENDER_PT_simplify,
     GI_RENDER_PT_film,
+    GI_RENDER_PT_pixel_filter,
+    GI_RENDER_PT_transparent,
     GI_RENDER_PT_performance,
+    GI_RENDER_PT_compositor,
     GI_VIEWLAYER_PT_passes,
     GI_VIEWLAYER_PT_override,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from types import SimpleNamespace
 
 import bpy
@@ -15,8 +16,8 @@ from .conftest import add, mesh
 PANELS = (*render_panels.CLASSES, *object_panels.CLASSES)
 JOINED = (
     "RENDER_PT_format", "RENDER_PT_output", "RENDER_PT_color_management", "DATA_PT_camera", "DATA_PT_lens",
-    "DATA_PT_camera_dof", "MATERIAL_PT_preview", "EEVEE_MATERIAL_PT_surface", "EEVEE_WORLD_PT_surface",
-    "DATA_PT_uv_texture",
+    "DATA_PT_camera_dof", "MATERIAL_PT_preview", "DATA_PT_uv_texture", "RENDER_PT_post_processing", "RENDER_PT_stamp",
+    "OBJECT_PT_shadow_terminator",
 )  # fmt: skip
 
 
@@ -42,6 +43,10 @@ class Layout:
     def label(self, **_):
         pass
 
+    def template_node_view(self, tree, node, socket):
+        assert node in tree.nodes[:] and socket in node.inputs[:]
+        self.drawn.append(socket.name)
+
 
 def context_of(item=None):
     scene = bpy.context.scene
@@ -54,15 +59,26 @@ def context_of(item=None):
         object=item,
         material=item.active_material if item else None,
         light=data if isinstance(data, bpy.types.Light) else None,
+        camera=data if isinstance(data, bpy.types.Camera) else None,
     )
 
 
 def draw(panel, context) -> list[str]:
     """The properties that a panel draws; none where it does not show."""
     drawn: list[str] = []
-    if panel.poll(context) and panel.__name__ != "GI_LIGHT_PT_nodes":  # which is Blender's own tree view
-        panel.draw(SimpleNamespace(layout=Layout(drawn)), context)
+    if panel.poll(context):
+        self = SimpleNamespace(layout=Layout(drawn), names=getattr(panel, "names", ()))
+        if hasattr(panel, "draw_header"):
+            panel.draw_header(self, context)
+        panel.draw(self, context)
     return drawn
+
+
+def with_nodes(owner):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # 5.x has materials' and worlds' nodes always in use
+        owner.use_nodes = True
+    return owner
 
 
 @pytest.mark.parametrize("own", [False, True])
@@ -71,12 +87,15 @@ def test_panels_draw_what_exists(scene, own):
     scene.world = bpy.data.worlds.new("World")
     item = add(scene, "Square", mesh())
     item.data.materials.append(bpy.data.materials.new("Paint"))
-    items = [item]
+    for owner in (scene.world, item.active_material):
+        with_nodes(owner)
+    items = [item, scene.camera]
+    scene.camera.data.type = "PANO"
     for kind in ("POINT", "SPOT", "AREA", "SUN"):
-        items.append(add(scene, kind, bpy.data.lights.new(kind, kind)))
+        items.append(add(scene, kind, with_nodes(bpy.data.lights.new(kind, kind))))
     drawn = {panel: [name for i in items for name in draw(panel, context_of(i))] for panel in PANELS}
     silent = [p.__name__ for p, names in drawn.items() if not names]
-    assert silent == ["GI_LIGHT_PT_nodes"]
+    assert silent == ["GI_RENDER_PT_light_paths"]  # a title over its parts
     assert "samples" in drawn[render_panels.GI_RENDER_PT_sampling]
     assert {"size", "spread", "spot_size", "angle"} <= set(drawn[object_panels.GI_LIGHT_PT_light])
 
@@ -110,3 +129,30 @@ def test_blenders_panels_are_joined_and_left(scene):
     finally:
         gi_engine.register()
     assert compat.ENGINE in bpy.types.RENDER_PT_format.COMPAT_ENGINES
+
+
+def test_a_constant_matters_while_it_is_chosen(scene):
+    own = scene.gi_engine.path
+    own.continuation = "THROUGHPUT"
+    assert not render_panels.matters(own, "continuation_constant")
+    own.continuation = "CONSTANT"
+    assert render_panels.matters(own, "continuation_constant")
+    assert render_panels.matters(own, "light_sampling")
+
+
+def test_our_sub_panels_have_parents_that_show(scene):
+    """Blender drops a panel whose parent it does not know, and hides one whose parent is hidden."""
+    for panel in PANELS:
+        parent = getattr(panel, "bl_parent_id", None)
+        if parent:
+            found = getattr(bpy.types, parent)
+            assert found in PANELS or compat.ENGINE in found.COMPAT_ENGINES, panel.__name__
+
+
+def test_our_panels_answer_for_any_object(scene):
+    """Blender asks every panel of a tab; one that raises leaves errors on the console at every redraw."""
+    items = [add(scene, "Square", mesh()), scene.camera, add(scene, "Empty", None)]
+    items.append(add(scene, "Lamp", bpy.data.lights.new("Lamp", "AREA")))
+    for item in items:
+        for panel in PANELS:
+            draw(panel, context_of(item))
