@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from . import control, native
+from .display import duration
 from .export import Exported, ExportError, export
 from .passes import contract_name, passes_of
 from .session import UPDATE_SECONDS, RenderFailed, Session
@@ -179,11 +180,15 @@ def describe(error: Exception) -> str:
 
 
 def status(progress: dict, left: float | None) -> str:
+    """The line over the picture. Blender leaves its own figure of the memory out where there is one."""
     rate = progress["rays"] / progress["seconds"] * 1e-6 if progress["seconds"] > 0 else 0
-    parts = [f"Sample {progress['samples_per_pixel']:.0f}", f"{rate:.1f} Mrays/s"]
+    parts = [
+        f"Mem:{progress['memory'] / 2**20:.0f}M",
+        f"Sample {progress['samples_per_pixel']:.0f}",
+        f"{rate:.1f} Mrays/s",
+    ]
     if left is not None:
-        minutes, seconds = divmod(int(left), 60)
-        parts.insert(0, f"Remaining {minutes:02d}:{seconds:02d}")
+        parts.insert(0, f"Remaining {duration(left)}")
     return " | ".join(parts)
 
 

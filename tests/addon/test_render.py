@@ -85,6 +85,16 @@ def test_borders_land_where_they_belong(plane, rendered, border, crop):
     assert not found.any()
 
 
+def test_a_border_on_whole_pixels_has_them_all(plane, rendered):
+    """0.7 of 20 pixels is 14 in Blender's single precision, and less in double."""
+    render = plane.render
+    render.resolution_x, render.resolution_y = 20, 20
+    render.use_border, render.use_crop_to_border = True, True
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.3, 0.7, 0.3, 0.7
+    found = rendered(plane)["ViewLayer.Position"][..., :2]
+    np.testing.assert_allclose(found, pixel_positions(20, 20)[6:14, 6:14], atol=0.1 * SCALE / 20)
+
+
 def test_layers_get_their_own_objects(scene, rendered):
     layers = [scene.view_layers[0], scene.view_layers.new("Second")]
     for i, layer in enumerate(layers):
