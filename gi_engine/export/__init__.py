@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from ..scene_data import Scene, Settings
 from .camera import export_camera
 from .film import export_film, frame_size
+from .images import release_scratch
 from .lights import export_light
 from .mesh import export_mesh
 from .objects import Collected, collect, place, stack_matrices
@@ -50,6 +51,7 @@ def export(depsgraph, descriptors: list[dict], engine=None, size=None, integrato
         export_objects(out, found, shaders, warnings)
     if scene.render.use_motion_blur:
         warnings.add("motion blur is not supported yet; rendered without")
+    release_scratch()
     settings = export_settings(scene, view_layer, descriptors, integrator)
     return Exported(out, settings, warnings.messages())
 

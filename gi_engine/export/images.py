@@ -5,12 +5,14 @@ Byte images stay bytes, as the file encodes them; the native side decodes sRGB. 
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import tempfile
 from contextlib import contextmanager
 
 import bpy
+import imbuf
 import numpy as np
 
 from .. import native
@@ -20,6 +22,10 @@ from .version import straight_floats_are_associated
 MAGENTA = (255, 0, 255, 255)
 SCENE_LINEAR = "Linear Rec.709"
 DATA = "Non-Color"
+DECODES_FILES = hasattr(imbuf.types.ImBuf, "with_buffer")  # from Blender 5.2 on
+BYTE_FILES = {"PNG", "JPEG", "TGA", "BMP", "WEBP", "IRIS"}  # and PNG only up to 8 bits a channel
+PNG_MAGIC, PNG_DEPTH_AT = b"\x89PNG", 24
+HEAD_BYTES = 64  # enough to tell the format
 TILE_TOKENS = ("<UDIM>", "<UVTILE>")
 
 _scratch = np.empty(0, np.float32)  # reused from image to image: paging in a fresh one takes longer than the copy
@@ -44,45 +50,86 @@ def read_image(image, warn, user=None) -> list[Image]:
 
 def read_frame(image, warn, user) -> list[Image]:
     if image.source == "SEQUENCE":
-        path = sequence_path(absolute(image), current_frame(image, user))
-        with temporary_image(image, path) as frame:
-            return [read_single(frame, image.name, warn, path)]
+        return [read_file(image, sequence_path(absolute(image), current_frame(image, user)), None, warn)]
     if image.source == "MOVIE" and current_frame(image, user) != 1:
         warn(f"image '{image.name}' is a movie; its first frame is shown")
-    return [read_single(image, image.name, warn, absolute(image))]
+    path = absolute(image)
+    if image.source == "FILE" and not image.is_dirty:
+        pixels = bytes_of_file(path, image.packed_file.data if image.packed_file else None)
+        if pixels is not None:
+            return [from_file_bytes(image, pixels)]
+    return [read_datablock(image, image.name, warn, path)]
 
 
 def read_tiles(image, warn) -> list[Image]:
-    """Each tile through a datablock of its own: scripts reach only the first tile of a UDIM image."""
+    """Each tile through its file: scripts reach only the first tile of a UDIM image."""
     packed = {tile_number(image, p.filepath): p.data for p in image.packed_files}
     tiles = []
     for tile in image.tiles:
         path = tile_path(absolute(image), tile.number)
-        with temporary_image(image, path, packed.get(tile.number)) as single:
-            made = read_single(single, image.name, warn, path)
-        made.tile = tile.number
-        tiles.append(made)
+        tiles.append(read_file(image, path, packed.get(tile.number), warn))
+        tiles[-1].tile = tile.number
     return tiles
 
 
-def read_single(image, name: str, warn, path: str) -> Image:
-    """One image of one frame. `image` may be None."""
+def read_file(like, path: str, packed: bytes | None, warn) -> Image:
+    """A file, or one packed in `like`, seen through the colour space and alpha mode of `like`."""
+    pixels = bytes_of_file(path, packed)
+    if pixels is not None:
+        return from_file_bytes(like, pixels)
+    with temporary_image(like, path, packed) as image:
+        return read_datablock(image, like.name, warn, path)
+
+
+def read_datablock(image, name: str, warn, path: str) -> Image:
+    """What Blender has loaded, or loads now and lets go of again. `image` may be None."""
+    stays = image is None or image.has_data
     if image is None or not load(image):
         warn(f"image '{name}' shows magenta: {trouble(image, path)}")
         return missing(name)
-    space = image.colorspace_settings.name
-    mode = "CHANNEL_PACKED" if space == DATA and image.alpha_mode != "NONE" else image.alpha_mode
-    alpha = mode if mode in ("CHANNEL_PACKED", "NONE") else "STRAIGHT"
-    if image.is_float:
-        pixels = with_four_channels(np.array(pixels_of(image)), image)
-        np.nan_to_num(pixels, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
-        # What files hold is associated already, which Blender marks as PREMUL; Cycles multiplies what is marked STRAIGHT.
-        associated = image.alpha_mode == "PREMUL" or straight_floats_are_associated()
-        return Image(name, pixels, alpha="PREMULTIPLIED" if associated and alpha == "STRAIGHT" else alpha)
-    encoded = with_four_channels(pixels_of(image), image)
-    if space in (DATA, SCENE_LINEAR, "sRGB") and working_space() == SCENE_LINEAR:
-        return Image(name, to_bytes(encoded), srgb=space == "sRGB", alpha=alpha)
+    found = from_floats(image, name) if image.is_float else from_bytes(image, name, as_bytes_or_floats(image))
+    if not stays and not image.is_dirty:
+        image.buffers_free()
+    return found
+
+
+# -------------------------------------------------------------------- interpreting pixels
+
+
+def from_floats(image, name: str) -> Image:
+    pixels = with_four_channels(pixels_of(image, np.empty(len(image.pixels), np.float32)), image)
+    np.nan_to_num(pixels, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+    # What files hold is associated already, which Blender marks as PREMUL; Cycles multiplies what is marked STRAIGHT.
+    associated = image.alpha_mode == "PREMUL" or straight_floats_are_associated()
+    alpha = alpha_of(image)
+    return Image(name, pixels, alpha="PREMULTIPLIED" if associated and alpha == "STRAIGHT" else alpha)
+
+
+def from_bytes(image, name: str, encoded: np.ndarray, alpha: str = "") -> Image:
+    """`encoded`: (H, W, 4) uint8, or float32 where bytes will not do."""
+    space, alpha = image.colorspace_settings.name, alpha or alpha_of(image)
+    if encoded.dtype == np.uint8:
+        if stays_encoded(space):
+            return Image(name, encoded, srgb=space == "sRGB", alpha=alpha)
+        encoded = encoded.astype(np.float32) / 255
     return Image(name, to_scene_linear(encoded, space), alpha=alpha)
+
+
+def from_file_bytes(image, encoded: np.ndarray) -> Image:
+    """As from_bytes, of what the file holds: Blender divides it by alpha where that is premultiplied."""
+    premultiplied = image.alpha_mode == "PREMUL" and alpha_of(image) == "STRAIGHT"
+    return from_bytes(image, image.name, encoded, "PREMULTIPLIED" if premultiplied else "")
+
+
+def alpha_of(image) -> str:
+    """How alpha is to be taken; both STRAIGHT and PREMUL are "STRAIGHT"."""
+    if image.alpha_mode != "NONE" and image.colorspace_settings.name == DATA:
+        return "CHANNEL_PACKED"
+    return image.alpha_mode if image.alpha_mode in ("CHANNEL_PACKED", "NONE") else "STRAIGHT"
+
+
+def stays_encoded(space: str) -> bool:
+    return space in (DATA, SCENE_LINEAR, "sRGB") and working_space() == SCENE_LINEAR
 
 
 def load(image) -> bool:
@@ -107,14 +154,62 @@ def missing(name: str) -> Image:
 # -------------------------------------------------------------------- pixels
 
 
-def pixels_of(image) -> np.ndarray:
-    """(n,) float32 in the scratch buffer, valid until the next call."""
+class Decoded:
+    """The pixels of an ImBuf as an array without a copy; NumPy keeps this object, and with it the pixels, alive."""
+
+    def __init__(self, decoded):
+        self.context = decoded.with_buffer()
+        pixels = np.asarray(self.context.__enter__())
+        self.__array_interface__ = {
+            "version": 3,
+            "shape": pixels.shape,
+            "typestr": pixels.dtype.str,
+            "data": (pixels.ctypes.data, True),
+        }
+
+
+def bytes_of_file(path: str, packed: bytes | None) -> np.ndarray | None:
+    """(H, W, 4) uint8 as a file holds it, decoded by Blender but not kept by it.
+
+    None for files of floats, for those that cannot be read and before Blender 5.2; the datablock knows more of them.
+    """
+    if not DECODES_FILES:
+        return None
+    try:
+        with io.BytesIO(packed) if packed is not None else open(path, "rb") as file:
+            data = file.read(HEAD_BYTES)
+            if not holds_bytes(data):
+                return None
+            decoded = imbuf.load_from_buffer(packed if packed is not None else data + file.read())
+    except (OSError, ValueError, RuntimeError):
+        return None
+    pixels = np.asarray(Decoded(decoded))
+    return pixels if pixels.dtype == np.uint8 and pixels.ndim == 3 and pixels.shape[2] == 4 else None
+
+
+def holds_bytes(head: bytes) -> bool:
+    kind = imbuf.file_type_from_buffer(head)
+    if kind is None or kind.id not in BYTE_FILES:
+        return False
+    return not head.startswith(PNG_MAGIC) or head[PNG_DEPTH_AT : PNG_DEPTH_AT + 1] <= b"\x08"
+
+
+def pixels_of(image, out: np.ndarray | None = None) -> np.ndarray:
+    """(n,) float32 in `out`, or in the scratch buffer and valid until the next call."""
     global _scratch
     count = len(image.pixels)
-    if _scratch.size < count:
-        _scratch = np.empty(count, np.float32)
-    image.pixels.foreach_get(_scratch[:count])
-    return _scratch[:count]
+    if out is None:
+        if _scratch.size < count:
+            _scratch = np.empty(count, np.float32)
+        out = _scratch[:count]
+    image.pixels.foreach_get(out)
+    return out
+
+
+def as_bytes_or_floats(image) -> np.ndarray:
+    """Of a byte image; floats where its colour space has to be converted."""
+    encoded = with_four_channels(pixels_of(image), image)
+    return to_bytes(encoded) if stays_encoded(image.colorspace_settings.name) else encoded
 
 
 def release_scratch() -> None:

@@ -53,6 +53,52 @@ def test_packed_file_that_is_gone(tmp_path):
     assert not warnings and tuple(tile.pixels[0, 0]) == SRGB_ORANGE
 
 
+@pytest.mark.parametrize("kind", ["PNG", "JPEG", "BMP", "TARGA", "WEBP", "IRIS", "TIFF"])
+@pytest.mark.parametrize("pack", [False, True])
+def test_files_are_read_as_blender_shows_them_and_not_kept(kind, pack, tmp_path):
+    made = bpy.data.images.new("writer", 5, 4, alpha=True)
+    made.pixels.foreach_set(np.random.default_rng(1).random(80, np.float32))
+    made.filepath_raw, made.file_format = str(tmp_path / "a"), kind
+    made.save()
+    image = bpy.data.images.load(str(tmp_path / "a"))
+    if pack:
+        image.pack()
+        image.buffers_free()
+    tile, warnings = read(image)
+    assert not warnings and not image.has_data
+    assert tile.alpha == "STRAIGHT" and tile.srgb
+    shown = np.array(image.pixels[:]).reshape(4, 5, 4)
+    np.testing.assert_array_equal(tile.pixels, np.rint(shown * 255))
+    assert read(image)[0].pixels.tolist() == tile.pixels.tolist() and image.has_data, "was loaded before: stays"
+
+
+def test_sixteen_bits_a_channel_are_floats(tmp_path):
+    image = bpy.data.images.new("writer", 2, 2, float_buffer=True)
+    image.pixels.foreach_set(np.full(16, 0.5, np.float32))
+    settings = bpy.context.scene.render.image_settings
+    settings.file_format, settings.color_depth = "PNG", "16"
+    image.save_render(str(tmp_path / "a.png"))
+    image = bpy.data.images.load(str(tmp_path / "a.png"))
+    tile, warnings = read(image)
+    assert not warnings and tile.pixels.dtype == np.float32 and not image.has_data
+    np.testing.assert_array_equal(tile.pixels.ravel(), image.pixels[:])
+
+
+def test_painted_pixels_count_and_stay(tmp_path):
+    image = bpy.data.images.load(str(write_png(tmp_path / "a.png")))
+    image.pixels.foreach_set(np.tile(np.array([0.0, 1.0, 0.0, 1.0], np.float32), 6))
+    assert tuple(read(image)[0].pixels[0, 0]) == (0, 255, 0, 255)
+    assert image.has_data and image.is_dirty
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 2, 0), reason="reads what Blender has divided by alpha")
+def test_premultiplied_file(tmp_path):
+    image = bpy.data.images.load(str(write_png(tmp_path / "a.png", (100, 50, 25, 128))))
+    image.alpha_mode = "PREMUL"
+    tile, _ = read(image)
+    assert tile.alpha == "PREMULTIPLIED" and tuple(tile.pixels[0, 0]) == (100, 50, 25, 128)
+
+
 def test_row_zero_is_at_the_bottom():
     image = bpy.data.images.new("rows", 1, 2, alpha=True)
     image.pixels.foreach_set([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
