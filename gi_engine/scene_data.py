@@ -129,6 +129,7 @@ class Program:
     pass_index: int = 0  # Material Index pass
     emission_sampling: str = "AUTO"  # NONE, AUTO, FRONT, BACK, FRONT_BACK: how its triangles are picked as lights
     transparent_shadows: bool = True
+    bump_correction: bool = True  # Cycles' Bump Map Correction
 
 
 @dataclass

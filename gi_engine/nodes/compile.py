@@ -103,6 +103,7 @@ class Compiler:
         settings = getattr(material, "cycles", None)
         program.emission_sampling = getattr(settings, "emission_sampling", "AUTO")
         program.transparent_shadows = getattr(material, "use_transparent_shadow", True)
+        program.bump_correction = getattr(getattr(material, "cycles", None), "use_bump_map_correction", True)
         return program
 
     def light(self, light) -> Program:

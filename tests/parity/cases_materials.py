@@ -1,6 +1,8 @@
 """One tile per closure and variant: smooth balls from above under a square lamp and a constant sky."""
 
-from .studio import LAMP, SKY, Case, ball, lamp, material, node, ortho_from_above, output, sheet, tree_of, world
+import math
+
+from .studio import LAMP, SKY, Case, ball, lamp, material, node, ortho_from_above, output, sheet, square, tree_of, world
 
 GLOSSY, GLASS, PRINCIPLED = "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfGlass", "ShaderNodeBsdfPrincipled"
 BRASS, RED = (0.9, 0.7, 0.4), (0.7, 0.2, 0.15)
@@ -107,6 +109,27 @@ def small_ball(made):
     return ball(made, 0.42, rings=32)
 
 
+def glossy_room(scene):
+    """Everything that Filter Glossy blurs, where diffuse surfaces see it."""
+    square(material("floor", "ShaderNodeBsdfDiffuse", Color=(0.6, 0.6, 0.6)), 3.0)
+    looks = {
+        "mirror": SIMPLE["mirror"],
+        "rough": SIMPLE["ggx 0.1"],
+        "beckmann": distribution(GLOSSY, "BECKMANN", Color=BRASS, Roughness=0.1),
+        "ashikhmin": distribution(GLOSSY, "ASHIKHMIN_SHIRLEY", Color=BRASS, Roughness=0.2),
+        "glass": CLEAR["glass 0.1"],
+        "refraction": CLEAR["refraction 0"],
+        "layers": principled(Coat_Weight=1.0, Coat_Roughness=0.0, Roughness=0.1),
+        "sheet": LAYERED["principled thin wall"],
+    }
+    for i, (name, look) in enumerate(looks.items()):
+        angle = i * 2.0 * math.pi / len(looks)
+        ball(look(name), 0.32, rings=24, location=(math.cos(angle), math.sin(angle), 0.3))
+    world(SKY)
+    lamp("AREA", (2.5, 1.5, 4.0), (-0.25, 0.4, 0.0), 200.0, shape="SQUARE", size=2.0, color=LAMP)
+    ortho_from_above(3.0)
+
+
 def no_material(scene):
     ball(None, 0.42, rings=32)
     light()
@@ -118,4 +141,6 @@ CASES = [
     sheet("closures", SIMPLE, small_ball, light),
     sheet("clear closures", CLEAR, small_ball, light, samples=128),
     sheet("principled", LAYERED, small_ball, light),
+    Case("filter glossy, little", glossy_room, samples=128, cycles={"blur_glossy": 0.1}),
+    Case("filter glossy, as new files", glossy_room, samples=128, cycles={"blur_glossy": 1.0}),
 ]

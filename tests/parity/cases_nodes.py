@@ -318,8 +318,8 @@ def light():
     lamp("AREA", (2.5, 1.5, 6.0), (-0.25, 0.4, 0.0), 300.0, shape="SQUARE", size=1.5)
 
 
-def bumped(kind, after=None, **inputs):
-    """A diffuse material whose normal a node bends."""
+def bumped(kind, after=None, shader="ShaderNodeBsdfDiffuse", correction=True, **inputs):
+    """A material whose normal a node bends."""
 
     def make(name):
         made = bpy.data.materials.new(name)
@@ -331,8 +331,8 @@ def bumped(kind, after=None, **inputs):
             put(tree, socket_of(bend.inputs, key), given[value] if isinstance(value, str) else value)
         if after:
             after(bend)
-        shader = node(tree, "ShaderNodeBsdfDiffuse", None, {"Color": (0.7, 0.6, 0.5), "Normal": bend.outputs[0]})
-        output(tree, shader)
+        output(tree, node(tree, shader, None, {"Color": (0.7, 0.6, 0.5), "Normal": bend.outputs[0]}))
+        made.cycles.use_bump_map_correction = correction
         return made
 
     return make
@@ -346,6 +346,9 @@ def slope(tree, given):
     return node(tree, "ShaderNodeCombineColor", None, {0: given["X"], 1: given["Y"], 2: 1.0}).outputs[0]
 
 
+STEEP = {"Color": (0.95, 0.2, 0.6), "Strength": 1.0}  # bent so far that much of what it mirrors is below the surface
+
+
 NORMALS = {
     "bump": bumped("ShaderNodeBump", Height=waves, Strength=0.8, Distance=0.1),
     "bump inverted": bumped(
@@ -355,6 +358,12 @@ NORMALS = {
     "normal map weak": bumped("ShaderNodeNormalMap", Color=slope, Strength=0.4),
     "normal map object": bumped("ShaderNodeNormalMap", lambda n: setattr(n, "space", "OBJECT"), Color=slope),
     "normal map world": bumped("ShaderNodeNormalMap", lambda n: setattr(n, "space", "WORLD"), Color=slope),
+    "steep diffuse": bumped("ShaderNodeNormalMap", **STEEP),
+    "steep diffuse uncorrected": bumped("ShaderNodeNormalMap", correction=False, **STEEP),
+    "steep glossy": bumped("ShaderNodeNormalMap", shader="ShaderNodeBsdfAnisotropic", **STEEP),
+    "steep glossy uncorrected": bumped(
+        "ShaderNodeNormalMap", shader="ShaderNodeBsdfAnisotropic", correction=False, **STEEP
+    ),
 }
 
 

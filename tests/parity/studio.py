@@ -24,6 +24,7 @@ class Case:
     tiles: list = field(default_factory=list)
     samples: int = 64
     tolerance: float = 0.003
+    cycles: dict = field(default_factory=dict)  # settings of the scene that are not neutral
 
 
 class Unavailable(Exception):

@@ -18,6 +18,8 @@ def rendered(name: str, factor: int = 1):
     scene = empty(case.size)
     case.build(scene)
     compare.neutral(scene, case.samples * factor)
+    for name, value in case.cycles.items():
+        setattr(scene.cycles, name, value)
     return compare.render_pairs(scene)
 
 

@@ -217,6 +217,7 @@ MaterialData read_program(const Record& r) {
                                                                          {"BACK", EmissionSampling::kBack},
                                                                          {"FRONT_BACK", EmissionSampling::kFrontBack}});
   m.transparent_shadows = r.get<bool>("transparent_shadows");
+  m.bump_correction = r.get<bool>("bump_correction");
   return m;
 }
 

@@ -22,6 +22,7 @@ struct PathSettings {
   BounceLimits limits;
   float clamp_direct, clamp_indirect;
   bool reflective_caustics, refractive_caustics;
+  float filter_glossy;
 };
 
 // Density of P towards `wi` about the shading normal, for the ways of drawing that know nothing of the BSDF.
@@ -72,7 +73,8 @@ class PathIntegrator final : public Integrator {
            p.real("clamp_direct"),
            p.real("clamp_indirect"),
            p.on("caustics_reflective"),
-           p.on("caustics_refractive")} {}
+           p.on("caustics_refractive"),
+           p.real("filter_glossy")} {}
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     for_each_pixel(context, pass, film,
@@ -88,6 +90,7 @@ class PathIntegrator final : public Integrator {
     RayOrigin origin;
     Rgb throughput(1.0f);
     float travelled = 0;            // along the path, for the footprint
+    float least_pdf = kInf;         // of the directions so far, per steradian
     bool may_scatter = true;        // false past the bounce limit: the next surface only emits
     bool seen_from_camera = true;   // nothing but transparent surfaces so far: what is not covered makes holes in alpha
     origin.query.path = path;
@@ -118,6 +121,8 @@ class PathIntegrator final : public Integrator {
 
       ShadingPoint point = context.scene.shading_point(ray, *hit, path, camera.footprint + camera.spread * (travelled + hit->t));
       context.scene.shade(point, bsdf);
+      // The less likely the path, the less sharp what it sees: as Blender's Filter Glossy does it.
+      if (least_pdf < s_.filter_glossy) bsdf.blur(0.5f * std::sqrt(1.0f - least_pdf / s_.filter_glossy));
       if (path.depth == 0) record_surface(context, point, bsdf, result);
 
       // Cut out what is held out.
@@ -165,6 +170,7 @@ class PathIntegrator final : public Integrator {
       path.without = next->flags & kDiffuse ? no_caustics() : 0;
       const bool delta = next->flags & kSpecular;
       origin = {light_query(point, bsdf), delta ? kInf : next->pdf_dir};
+      if (!delta) least_pdf = std::min(least_pdf, next->pdf_dir);
       travelled += hit->t;
       ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
 
@@ -242,6 +248,8 @@ const Descriptor& path_descriptor() {
            "Largest radiance that one sample may add after a bounce; 0 is off. Loses light"},
           {"caustics_reflective", "Reflective Caustics", Kind::kBool, 1, 0, 1, "Mirrors and glossy surfaces seen by diffuse ones"},
           {"caustics_refractive", "Refractive Caustics", Kind::kBool, 1, 0, 1, "Glass seen by diffuse surfaces"},
+          {"filter_glossy", "Filter Glossy", Kind::kFloat, 0, 0, 100,
+           "Makes glossy surfaces rougher where unlikely paths see them: less noise, blurred caustics. 0 is off"},
       },
       [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<PathIntegrator>(p); }};
   return descriptor;

@@ -271,7 +271,9 @@ ShadingPoint Scene::world_point(Vec3 direction, const PathState& path) const {
 void Scene::shade(ShadingPoint& point, Bsdf& bsdf) const {
   bsdf.clear(point.ng, point.ns, point.path.without);
   bsdf.set_terminator_frequency(1.0f / (1.0f - 0.5f * instances_[point.instance].data->shadow_terminator_offset));
-  material(material_of(point.instance, point.triangle)).program.run(point, *resources_, &bsdf);
+  const MaterialData& m = material(material_of(point.instance, point.triangle));
+  bsdf.set_bump_correction(m.bump_correction);
+  m.program.run(point, *resources_, &bsdf);
   bsdf.finish(point.wo);
 }
 

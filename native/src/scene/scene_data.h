@@ -95,7 +95,7 @@ struct MaterialData {
   Program program;
   int pass_index = 0;
   EmissionSampling emission_sampling = EmissionSampling::kAuto;
-  bool transparent_shadows = true;
+  bool transparent_shadows = true, bump_correction = true;
 };
 
 struct SceneData {

@@ -43,6 +43,14 @@ void remove_side(Lobe& lobe, uint8_t side) {
       lobe);
 }
 
+void blur_lobe(Lobe& lobe, float alpha) {
+  std::visit(
+      [alpha](auto& l) {
+        if constexpr (requires { l.blur(alpha); }) l.blur(alpha);
+      },
+      lobe);
+}
+
 }  // namespace
 
 void Bsdf::add(Rgb weight, const Lobe& lobe, const Frame& frame) {
@@ -70,6 +78,16 @@ void Bsdf::finish(Vec3 wo) {
   for (int i = 0; i < count_; ++i) entries_[i].select *= scale;
 }
 
+void Bsdf::blur(float alpha) {
+  flags_ &= kTransparent;
+  for (int i = 0; i < count_; ++i) {
+    Entry& e = entries_[i];
+    blur_lobe(e.lobe, alpha);
+    e.flags = uint8_t((e.flags & ~kKinds) | (flags_of(e.lobe) & kKinds));
+    flags_ |= e.flags;
+  }
+}
+
 void Bsdf::hold_out() {
   count_ = 0;
   emission = Rgb(), holdout = Rgb(1.0f) - transparency;
@@ -85,7 +103,7 @@ float Bsdf::shadowing(const Entry& e, Vec3 wi, float cos_i, bool sampled) const 
     const bool diffuse = e.flags & kDiffuse;
     const float cos_ns_wi = dot(ns_, wi), cos_ns_n = dot(ns_, e.frame.z);
     if (cos_ns_wi * cos_ns_n * cos_i < 0.0f && (!sampled || diffuse)) return 0.0f;
-    if (diffuse) s = bump_shadowing(cos_ns_wi, cos_ns_n);
+    if (diffuse && correct_bumps_) s = bump_shadowing(cos_ns_wi, cos_ns_n);
   }
   return terminator_ > 1.0f ? s * terminator_shift(cos_i, terminator_) : s;
 }

@@ -34,12 +34,18 @@ class Bsdf {
   // The object's shadow terminator offset, as a frequency: 1 / (1 − offset / 2). Survives clear().
   void set_terminator_frequency(float f) { terminator_ = f; }
 
+  // Blender's Bump Map Correction: bent normals neither reflect what is below the surface nor make hard terminators. Survives clear().
+  void set_bump_correction(bool on) { correct_bumps_ = on; }
+  bool bump_correction() const { return correct_bumps_; }
+
   // Adds `lobe` in the frame whose z is the lobe's own (bumped) normal. Negative components count as 0; weights that come to
   // nothing are dropped, and so are lobes beyond kMaxLobes.
   void add(Rgb weight, const Lobe& lobe, const Frame& frame);
   // Called once after the last add: selection probabilities from the lobes' albedos towards `wo`.
   void finish(Vec3 wo);
 
+  // Makes glossy and specular lobes at least as rough as `alpha`; diffuse ones stay as they are. After finish().
+  void blur(float alpha);
   // Turns the whole surface, but for what it lets through, into a hole of the picture. After finish().
   void hold_out();
 
@@ -89,6 +95,7 @@ class Bsdf {
   uint8_t flags_ = 0, without_ = 0;
   float select_transparent_ = 0;
   float terminator_ = 1;
+  bool correct_bumps_ = true;
   Vec3 ng_{0, 0, 1}, ns_{0, 0, 1};  // both face wo
 };
 

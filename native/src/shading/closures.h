@@ -19,7 +19,9 @@ inline void add_diffuse(ShadeState& s, Rgb weight, Rgb color, float roughness, V
 // A normal socket's value; the shading normal where it is not linked.
 inline Vec3 normal_or_shading(const ShadeState& s, Vec3 n) { return normalize_or(n, s.point.ns); }
 
-inline Vec3 visible_normal(const ShadeState& s, Vec3 n) { return valid_reflection_normal(s.point.ng, s.point.wo, n); }
+inline Vec3 visible_normal(const ShadeState& s, Vec3 n) {
+  return s.bsdf->bump_correction() ? valid_reflection_normal(s.point.ng, s.point.wo, n) : n;
+}
 
 // `v` turned by `angle` radians, right-handed, about the unit `axis`. [Rodrigues]
 inline Vec3 rotated(Vec3 v, Vec3 axis, float angle) {

@@ -13,6 +13,7 @@ struct AshikhminShirley {
     const float ax = std::clamp(alpha_x, 1e-4f, 1.0f), ay = std::clamp(alpha_y, 1e-4f, 1.0f);
     return {ax, ay, 2.0f / (ax * ax) - 2.0f, 2.0f / (ay * ay) - 2.0f};
   }
+  void blur(float alpha) { *this = make(std::max(alpha_x, alpha), std::max(alpha_y, alpha)); }
   bool smooth() const { return std::max(alpha_x, alpha_y) <= 1e-4f; }
   uint8_t flags() const { return kReflection | (smooth() ? kSpecular : kGlossy); }
 

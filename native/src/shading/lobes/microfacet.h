@@ -37,6 +37,11 @@ struct Microfacet {
     if (side & kReflection) fresnel.reflection_tint = Rgb();
     if (side & kTransmission) fresnel.transmission_tint = Rgb();
   }
+  // At least as rough as alpha; what energy it keeps is left as it was.
+  void blur(float alpha) {
+    facets = {std::max(facets.alpha_x, alpha), std::max(facets.alpha_y, alpha)};
+    smooth = is_smooth(facets.alpha_x, facets.alpha_y, sides, fresnel);
+  }
   uint8_t flags() const { return sides | (smooth ? kSpecular : kGlossy); }
   LobeEval eval(Vec3 wo, Vec3 wi) const;
   std::optional<LobeSample> sample(Vec3 wo, Vec2 u, float u_lobe) const;
@@ -45,10 +50,10 @@ struct Microfacet {
  private:
   static Microfacet make(float alpha_x, float alpha_y, const Fresnel& fresnel, uint8_t sides) {
     const float ax = clamp01(alpha_x), ay = clamp01(alpha_y);
-    return {.facets = {ax, ay},
-            .fresnel = fresnel,
-            .sides = sides,
-            .smooth = ax * ay <= 2e-10f || ((sides & kTransmission) && straight(fresnel.ior))};
+    return {.facets = {ax, ay}, .fresnel = fresnel, .sides = sides, .smooth = is_smooth(ax, ay, sides, fresnel)};
+  }
+  static bool is_smooth(float ax, float ay, uint8_t sides, const Fresnel& fresnel) {
+    return ax * ay <= 2e-10f || ((sides & kTransmission) && straight(fresnel.ior));
   }
   bool reflects() const { return sides & kReflection; }
   bool transmits() const { return sides & kTransmission; }

@@ -10,6 +10,7 @@ struct ThinTransmission {
     lobe_.preserve_energy(cos_o, Rgb(1.0f));
   }
 
+  void blur(float alpha) { lobe_.blur(alpha); }
   uint8_t flags() const { return turned(lobe_.flags()); }
   LobeEval eval(Vec3 wo, Vec3 wi) const { return lobe_.eval(wo, {wi.x, wi.y, -wi.z}); }
   std::optional<LobeSample> sample(Vec3 wo, Vec2 u, float u_lobe) const {
