@@ -17,7 +17,7 @@ import numpy as np
 
 from .. import native
 from ..scene_data import Image
-from .version import straight_floats_are_associated
+from .version import divided_bytes_are_associated, straight_floats_are_associated
 
 MAGENTA = (255, 0, 255, 255)
 SCENE_LINEAR = "Linear Rec.709"
@@ -54,7 +54,7 @@ def read_frame(image, warn, user) -> list[Image]:
     if image.source == "MOVIE" and current_frame(image, user) != 1:
         warn(f"image '{image.name}' is a movie; its first frame is shown")
     path = absolute(image)
-    if image.source == "FILE" and not image.is_dirty:
+    if image.source == "FILE" and not image.is_dirty and not (image.packed_file and is_premultiplied(image)):
         pixels = bytes_of_file(path, image.packed_file.data if image.packed_file else None)
         if pixels is not None:
             return [from_file_bytes(image, pixels)]
@@ -87,7 +87,14 @@ def read_datablock(image, name: str, warn, path: str) -> Image:
     if image is None or not load(image):
         warn(f"image '{name}' shows magenta: {trouble(image, path)}")
         return missing(name)
-    found = from_floats(image, name) if image.is_float else from_bytes(image, name, as_bytes_or_floats(image))
+    if image.is_float:
+        found = from_floats(image, name)
+    else:
+        # Blender has divided premultiplied colours by alpha, which Cycles does not undo where it gets them from Blender.
+        from_blender = image.is_dirty or image.packed_file or image.source == "GENERATED"
+        kept = from_blender and is_premultiplied(image) and divided_bytes_are_associated()
+        alpha = "PREMULTIPLIED" if kept else alpha_of(image)
+        found = from_bytes(image, name, as_bytes_or_floats(image), alpha)
     if not stays and not image.is_dirty:
         image.buffers_free()
     return found
@@ -105,9 +112,9 @@ def from_floats(image, name: str) -> Image:
     return Image(name, pixels, alpha="PREMULTIPLIED" if associated and alpha == "STRAIGHT" else alpha)
 
 
-def from_bytes(image, name: str, encoded: np.ndarray, alpha: str = "") -> Image:
+def from_bytes(image, name: str, encoded: np.ndarray, alpha: str) -> Image:
     """`encoded`: (H, W, 4) uint8, or float32 where bytes will not do."""
-    space, alpha = image.colorspace_settings.name, alpha or alpha_of(image)
+    space = image.colorspace_settings.name
     if encoded.dtype == np.uint8:
         if stays_encoded(space):
             return Image(name, encoded, srgb=space == "sRGB", alpha=alpha)
@@ -116,9 +123,7 @@ def from_bytes(image, name: str, encoded: np.ndarray, alpha: str = "") -> Image:
 
 
 def from_file_bytes(image, encoded: np.ndarray) -> Image:
-    """As from_bytes, of what the file holds: Blender divides it by alpha where that is premultiplied."""
-    premultiplied = image.alpha_mode == "PREMUL" and alpha_of(image) == "STRAIGHT"
-    return from_bytes(image, image.name, encoded, "PREMULTIPLIED" if premultiplied else "")
+    return from_bytes(image, image.name, encoded, "PREMULTIPLIED" if is_premultiplied(image) else alpha_of(image))
 
 
 def alpha_of(image) -> str:
@@ -126,6 +131,10 @@ def alpha_of(image) -> str:
     if image.alpha_mode != "NONE" and image.colorspace_settings.name == DATA:
         return "CHANNEL_PACKED"
     return image.alpha_mode if image.alpha_mode in ("CHANNEL_PACKED", "NONE") else "STRAIGHT"
+
+
+def is_premultiplied(image) -> bool:
+    return image.alpha_mode == "PREMUL" and alpha_of(image) == "STRAIGHT"
 
 
 def stays_encoded(space: str) -> bool:

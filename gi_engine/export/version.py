@@ -11,3 +11,8 @@ def voronoi_hashes_floats() -> bool:
 def straight_floats_are_associated() -> bool:
     """Up to Blender 4.5 Cycles takes the colours of float images for multiplied by alpha, however they are marked."""
     return bpy.app.version < (5, 0, 0)
+
+
+def divided_bytes_are_associated() -> bool:
+    """From Blender 5.0 on Cycles takes byte colours that Blender has divided by alpha for still multiplied by it."""
+    return bpy.app.version >= (5, 0, 0)

@@ -99,6 +99,23 @@ def test_premultiplied_file(tmp_path):
     assert tile.alpha == "PREMULTIPLIED" and tuple(tile.pixels[0, 0]) == (100, 50, 25, 128)
 
 
+@pytest.mark.skipif(bpy.app.version < (5, 0, 0), reason="Cycles multiplies them there")
+def test_premultiplied_and_packed(tmp_path):
+    """Blender divides by alpha what Cycles then takes for multiplied: colours may be brighter than white."""
+    image = bpy.data.images.load(str(write_png(tmp_path / "a.png", (200, 50, 25, 128))))
+    image.pack()
+    image.alpha_mode = "PREMUL"
+    material = emitter("ShaderNodeTexImage", image)
+    texture = next(n for n in material.node_tree.nodes if n.type == "TEX_IMAGE")
+    emission = next(n for n in material.node_tree.nodes if n.type == "EMISSION")
+    material.node_tree.links.new(texture.outputs["Alpha"], emission.inputs["Strength"])
+    data = Scene()
+    data.programs = [Compiler(data, bpy.context.evaluated_depsgraph_get(), pytest.fail).material(material)]
+    color = native.module().emission(data, 0, np.full((1, 3), 0.5, np.float32), (0.0, 0.0, 1.0))[0]
+    encoded = np.minimum(np.array([200, 50, 25]) * 255 / 128, 255).round() / 128  # divided by Blender, then by us
+    np.testing.assert_allclose(color, ((encoded + 0.055) / 1.055) ** 2.4 * 128 / 255, rtol=0.02)
+
+
 def test_row_zero_is_at_the_bottom():
     image = bpy.data.images.new("rows", 1, 2, alpha=True)
     image.pixels.foreach_set([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0])

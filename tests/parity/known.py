@@ -5,8 +5,6 @@ import bpy
 KNOWN: dict[str, str] = {
     "zeyu_telescope": "two of its spheres are in the same place: in Cycles rounding lets them shadow one another, ours are lit; "
     "with either one alone all blocks agree",
-    "inputs / image premultiplied": "a byte image set to premultiplied after it was packed: our colours are divided by alpha once too often",
-    "inputs on balls / image premultiplied": "a byte image set to premultiplied after it was packed: our colours are divided by alpha once too often",
 }
 
 if bpy.app.version < (5, 0, 0):

@@ -31,6 +31,7 @@ float srgb_to_linear(float x) {
     }
     return t;
   }();
+  if (x > 1.0f) return std::pow((x + 0.055f) / 1.055f, 2.4f);  // premultiplied colours that exceed their alpha
   const float position = clamp01(x) * float(kSize);
   const int i = int(position);
   return lerp(table[size_t(i)], table[size_t(i) + 1], position - float(i));
