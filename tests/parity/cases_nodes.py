@@ -393,6 +393,20 @@ def scene_of_meshes(scene):
     scene_camera()
 
 
+def stretched(scene):
+    """Coarse smooth balls, squashed: Cycles interpolates normals in another space where a mesh is shared."""
+    grey = material("grey", Color=(0.6, 0.6, 0.6))
+    mapped = bumped("ShaderNodeNormalMap", **STEEP)("mapped")
+    places = ((-0.7, -0.5, 0.2), (0.7, -0.5, 0.2), (-0.7, 0.7, 0.2), (0.7, 0.7, 0.2))
+    shared = None
+    for place, look in zip(places, (grey, grey, grey, mapped), strict=True):
+        made = ball(look, 0.4, rings=6, location=place, scale=(1.6, 0.7, 0.3), rotation=(0.2, 0.1, 0.4))
+        if look is grey and place[0] < 0:
+            shared = made.data = shared or made.data
+    light()
+    scene_camera()
+
+
 def scene_camera():
     from .studio import camera
 
@@ -452,6 +466,7 @@ CASES = [
     sheet("normals", NORMALS, tile_square, light),
     sheet("normals on balls", NORMALS, tile_turned, light),
     Case("meshes", scene_of_meshes),
+    Case("stretched meshes", stretched),
     Case("see-through", leaves),
     Case("by ray", by_ray),
 ]

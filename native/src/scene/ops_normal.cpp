@@ -25,7 +25,7 @@ void normal_map_tangent(const Operands& o, ShadeState& s) {
   const float strength = o.f(2);
   c = {c.x * strength, c.y * strength, lerp(1.0f, c.z, clamp01(strength))};
   // In object space, where the normal is as it was before it was turned towards the viewer.
-  const Vec3 n = normal_to_object(s, p.backfacing ? -p.ns : p.ns), t = tangent->direction;
+  const Vec3 n = s.resources.scene->smooth_object_normal(p), t = tangent->direction;
   const Vec3 mapped = normal_to_world(s, normalize(c.x * t + c.y * tangent->side * cross(n, t) + c.z * n));
   set_or_keep(o, s, p.backfacing ? -mapped : mapped);
 }

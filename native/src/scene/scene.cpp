@@ -18,6 +18,14 @@ Vec3 corner_normal(const MeshData& mesh, uint32_t triangle, int k) {
   return {q[0], q[1], q[2]};
 }
 
+// Turns and scales alike in all directions.
+bool keeps_angles(const Affine& a) {
+  const Vec3 x = a.column(0), y = a.column(1), z = a.column(2);
+  const float s = dot(x, x), small = 1e-4f * s;
+  return std::abs(dot(y, y) - s) < small && std::abs(dot(z, z) - s) < small && std::abs(dot(x, y)) < small && std::abs(dot(y, z)) < small &&
+         std::abs(dot(z, x)) < small;
+}
+
 }  // namespace
 
 Scene::Scene(SceneData data, std::unique_ptr<ShaderResources> resources, const std::string& embree, int threads)
@@ -43,6 +51,8 @@ void Scene::place_meshes() {
     placed.to_object = i.matrix.inverse();
     placed.mirrored = i.matrix.determinant() < 0.0f;
     placed.world_space = uses[i.mesh] == 1;
+    // So does Cycles, which moves a mesh that one object alone uses, normals and all.
+    placed.world_normals = placed.world_space && !keeps_angles(i.matrix);
     placed.data = &i;
     MeshData& mesh = data_.meshes[i.mesh];
     if (placed.world_space && !i.matrix.is_identity()) {
@@ -201,8 +211,12 @@ ShadingPoint Scene::surface_point(uint32_t instance, uint32_t triangle, float b1
   if (mesh.normals_domain != Domain::kFace) {
     const float w[3] = {1.0f - b1 - b2, b1, b2};
     Vec3 sum;
-    for (int k = 0; k < 3; ++k) sum += w[k] * corner_normal(mesh, triangle, k);
-    p.ns = normalize_or(placed.to_object.transposed_vector(sum), p.ng);
+    const auto to_world = [&](Vec3 v) { return placed.to_object.transposed_vector(v); };
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 corner = corner_normal(mesh, triangle, k);
+      sum += w[k] * (placed.world_normals ? normalize(to_world(corner)) : corner);
+    }
+    p.ns = normalize_or(placed.world_normals ? sum : to_world(sum), p.ng);
   }
   p.backfacing = dot(p.ng, wo) < 0.0f;
   if (p.backfacing) p.ng = -p.ng, p.ns = -p.ns;
@@ -379,6 +393,17 @@ void Scene::interpolate(const MeshData& mesh, const AttributeData& a, const Shad
     for (size_t c = 0; c < n; ++c) sum[c] += w[k] * a.data[at * n + c];
   }
   std::copy_n(sum, n, out);
+}
+
+Vec3 Scene::smooth_object_normal(const ShadingPoint& point) const {
+  const Instance& placed = instances_[point.instance];
+  const MeshData& mesh = data_.meshes[placed.mesh];
+  const Vec3 flat = normalize(placed.to_world.transposed_vector(point.backfacing ? -point.ng : point.ng));
+  if (mesh.normals_domain == Domain::kFace) return flat;
+  const float w[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
+  Vec3 sum;
+  for (int k = 0; k < 3; ++k) sum += w[k] * corner_normal(mesh, point.triangle, k);
+  return normalize_or(sum, flat);
 }
 
 std::optional<CornerTangent> Scene::uv_tangent(const ShadingPoint& point, int slot) const {

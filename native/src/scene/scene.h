@@ -21,6 +21,7 @@ struct Instance {
   Affine to_world, to_object;
   bool mirrored = false;     // negative determinant
   bool world_space = false;  // the mesh's positions are already in world space
+  bool world_normals = false;  // corner normals are made unit in world space before they are interpolated, not in object space
   const InstanceData* data = nullptr;
 };
 
@@ -70,6 +71,8 @@ class Scene {
   // and instancer attributes. Returns how many components it has; 0 if the object has none. Missing components: 0, alpha 1.
   int attribute(const ShadingPoint& point, int slot, float out[4]) const;
   bool active_uv(const ShadingPoint& point, float out[4]) const;  // the UV map that renders by default
+  // Interpolated, unit, object space, not turned to the viewer; flat where the mesh has no normals.
+  Vec3 smooth_object_normal(const ShadingPoint& point) const;
   // The tangent of the UV map in slot `slot`, interpolated but not made unit, object space. For the slots that ops of the
   // object's materials take tangents of; null if the object has no such map.
   std::optional<CornerTangent> uv_tangent(const ShadingPoint& point, int slot) const;
