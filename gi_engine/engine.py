@@ -13,11 +13,14 @@ from . import control, native
 from .display import duration
 from .export import Exported, ExportError, export
 from .passes import contract_name, passes_of
-from .session import UPDATE_SECONDS, RenderFailed, Session
+from .session import RenderFailed, Session
 
 WHOLE = 1 << 16  # begin_result clamps it to the border's size
 PREVIEW_SAMPLES = 32
-CONSOLE_SECONDS = 5.0  # without a window, every status is a line on the console
+WINDOW = not bpy.app.background
+# Seconds between what is told. Each status has the window draw the picture anew; without one, it is a line on the console.
+STATUS_SECONDS = 0.5 if WINDOW else 5.0
+SHOW_SECONDS, SHOW_SECONDS_LATER = 0.25, 3.0
 USER_ERRORS = (ExportError, RenderFailed, native.NativeMissing)
 
 # Said once in an animation, not once a frame.
@@ -103,12 +106,13 @@ class GIEngine(bpy.types.RenderEngine):
 
     def stream(self, session: Session, result) -> None:
         """Shows the image as it grows until it is done or the user has had enough."""
-        shown = time.monotonic()
+        started = shown = time.monotonic()
         while not session.wait():
             if self.stopped():
                 session.native.cancel()
                 break
-            if time.monotonic() - shown >= UPDATE_SECONDS:
+            now = time.monotonic()
+            if WINDOW and now - shown >= show_interval(now - started):
                 self.show(session, result)
                 shown = time.monotonic()
             self.tell(session.progress())
@@ -130,13 +134,13 @@ class GIEngine(bpy.types.RenderEngine):
         self.update_result(result)
 
     def tell(self, progress: dict) -> None:
-        self.update_progress(progress["fraction"])
         left = progress["remaining"] if math.isfinite(progress["remaining"]) else None
         noise = progress["noise"] if math.isfinite(progress["noise"]) else None
-        memory = progress["memory"] / 2**20
-        self.update_memory_stats(memory_used=memory, memory_peak=memory)
-        if not bpy.app.background or time.monotonic() >= self.next_status:
-            self.next_status = time.monotonic() + CONSOLE_SECONDS
+        if time.monotonic() >= self.next_status:
+            self.next_status = time.monotonic() + STATUS_SECONDS
+            memory = progress["memory"] / 2**20
+            self.update_progress(progress["fraction"])
+            self.update_memory_stats(memory_used=memory, memory_peak=memory)
             self.update_stats("", status(progress, left))
         control.report(
             control.Progress(
@@ -160,7 +164,7 @@ class GIEngine(bpy.types.RenderEngine):
         # Only report() makes the operator fail and keeps Blender from writing a file; error_set is for the window.
         message = describe(error)
         control.fail(message)
-        if not bpy.app.background:
+        if WINDOW:
             self.error_set(message)
         self.report({"ERROR"}, message)
 
@@ -177,6 +181,11 @@ def describe(error: Exception) -> str:
         traceback.print_exception(error)
         return f"internal error: {type(error).__name__}: {error}"
     return str(error)
+
+
+def show_interval(elapsed: float) -> float:
+    """Seconds until the picture is shown anew: seldom once it changes slowly, for showing costs the window time."""
+    return min(max(SHOW_SECONDS, 0.1 * elapsed), SHOW_SECONDS_LATER)
 
 
 def status(progress: dict, left: float | None) -> str:

@@ -8,7 +8,6 @@ from . import native
 from .scene_data import Scene, Settings
 
 POLL_SECONDS = 0.05  # how soon a cancel is seen
-UPDATE_SECONDS = 0.25  # how often the image is shown
 
 
 class RenderFailed(RuntimeError):

@@ -332,6 +332,7 @@ def test_progress_grows_and_images_arrive(plane, watched, monkeypatch):
         shown.append(time.monotonic())
         watched.cancelled = len(shown) >= 3
 
+    monkeypatch.setattr(engine, "WINDOW", True)  # without one, nobody looks before the end
     monkeypatch.setattr(engine.GIEngine, "show", count)
     watched.on_progress = lambda progress: told.append(progress)
     bpy.ops.render.render()
@@ -339,6 +340,12 @@ def test_progress_grows_and_images_arrive(plane, watched, monkeypatch):
     assert fractions == sorted(fractions) and fractions[-1] > 0
     assert 0.2 < shown[1] - shown[0] < 0.6
     assert told[-1].rays > 0 and told[-1].passes > 0
+
+
+def test_pictures_come_seldom_once_they_change_slowly():
+    assert engine.show_interval(0.0) == 0.25
+    assert engine.show_interval(20.0) == pytest.approx(2.0)
+    assert engine.show_interval(3600.0) == 3.0
 
 
 def test_rendering_leaves_pythons_other_threads_running(plane, watched):
