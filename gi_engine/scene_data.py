@@ -83,9 +83,6 @@ class Light:
     cast_shadow: bool = True
     use_mis: bool = True
     max_bounces: int = 1024
-    diffuse_factor: float = 1.0
-    glossy_factor: float = 1.0
-    transmission_factor: float = 1.0
 
 
 @dataclass

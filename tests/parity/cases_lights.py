@@ -93,6 +93,14 @@ def stretched(made):
     made.scale = (2.0, 0.5, 1.0)
 
 
+def unseen_by(*kinds):
+    def after(made):
+        for kind in kinds:
+            setattr(made, f"visible_{kind}", False)
+
+    return after
+
+
 def shining_mesh(name, one_sided=False, factor=1.0):
     def build(scene):
         subjects()
@@ -180,6 +188,8 @@ CASES = [
         energy=8.0,
         visible=True,
     ),
+    lit("lamp not for diffuse", "AREA", unseen_by("diffuse"), shape="SQUARE", size=0.6),
+    lit("lamp not for glossy", "AREA", unseen_by("glossy"), shape="SQUARE", size=0.6),
     lit("sun", "SUN", energy=3.0, angle=0.0, rotation=(0.5, 0.3, 0)),
     lit("sun, angle", "SUN", energy=3.0, angle=0.2, rotation=(0.5, 0.3, 0)),
     lit("lamp of weak diffuse", "POINT", shadow_soft_size=0.1, diffuse_factor=0.3, specular_factor=0.6),

@@ -199,8 +199,6 @@ LampData read_lamp(const Record& r) {
   l.visibility = r.get<uint32_t>("visibility");
   l.cast_shadow = r.get<bool>("cast_shadow"), l.use_mis = r.get<bool>("use_mis");
   l.max_bounces = r.get<int>("max_bounces");
-  l.diffuse_factor = r.real("diffuse_factor"), l.glossy_factor = r.real("glossy_factor"),
-  l.transmission_factor = r.real("transmission_factor");
   return l;
 }
 

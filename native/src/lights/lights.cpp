@@ -204,12 +204,6 @@ struct LightSet::Impl {
     return std::max(sum / kPoints, 1e-3f);
   }
 
-  static void set_scales(LightSample& s, uint32_t visibility, float diffuse, float glossy, float transmission) {
-    s.diffuse_scale = visibility & kRayDiffuse ? diffuse : 0.0f;
-    s.glossy_scale = visibility & kRayGlossy ? glossy : 0.0f;
-    s.transmission_scale = visibility & kRayTransmission ? transmission : 0.0f;
-  }
-
   std::optional<LightSample> sample_lamp(uint32_t light, const LightQuery& query, Vec2 u) const {
     const Lamp& lamp = lamps[light];
     const LampData& data = *lamp.data;
@@ -221,7 +215,7 @@ struct LightSet::Impl {
     s.radiance = data.color * shape->scale * lamp_program(lamp, query.position, s.wi, s.distance, seen_by_light(query.path, s.distance));
     if (!is_finite(s.radiance) || !std::isfinite(s.pdf_dir)) return std::nullopt;  // on top of a point
     s.cast_shadow = data.cast_shadow, s.use_mis = data.use_mis && lamp.findable;
-    set_scales(s, data.visibility, data.diffuse_factor, data.glossy_factor, data.transmission_factor);
+    s.visibility = data.visibility;
     return s;
   }
 
@@ -238,7 +232,7 @@ struct LightSet::Impl {
           scene.surface_point(triangle.instance, triangle.triangle, t->b1, t->b2, -t->wi, seen_by_light(query.path, t->distance));
       s.radiance = scene.emission(p);
     }
-    set_scales(s, scene.instances()[triangle.instance].data->visibility, 1, 1, 1);
+    s.visibility = scene.instances()[triangle.instance].data->visibility;
     return s;
   }
 
@@ -250,7 +244,7 @@ struct LightSet::Impl {
     LightSample s;
     s.wi = wi, s.pdf_dir = pdf, s.light = world_light();
     s.radiance = scene.world_radiance(wi, seen_by_light(query.path, kInf));
-    set_scales(s, data.visibility, 1, 1, 1);
+    s.visibility = data.visibility;
     return s;
   }
 

@@ -25,7 +25,7 @@ struct LightSample {
   uint32_t light = 0;  // index, below LightSet::count
   bool cast_shadow = true;
   bool use_mis = true;  // false: rays never find it by themselves, its weight is 1
-  float diffuse_scale = 1, glossy_scale = 1, transmission_scale = 1;  // Blender's per-lamp factors and visibility
+  uint32_t visibility = 0xffffffffu;  // RayKind bits: what of a surface the light reaches
 };
 
 struct LightEval {

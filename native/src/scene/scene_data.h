@@ -78,7 +78,6 @@ struct LampData {  // units: gi_engine/scene_data.py Light
   uint32_t visibility = 0xffffffffu;
   bool cast_shadow = true, use_mis = true;
   int max_bounces = 1024;
-  float diffuse_factor = 1, glossy_factor = 1, transmission_factor = 1;
 };
 
 struct WorldData {

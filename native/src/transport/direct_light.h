@@ -24,16 +24,17 @@ inline float found_weight(LightSampling mode, float pdf_ray, float pdf_light) {
   return mode == LightSampling::kOn ? 0.0f : power_heuristic(pdf_ray, pdf_light);
 }
 
-// f |cos| of the point for a sampled light, with the lamp's per-component factors where it has any.
+// f |cos| of the point for a sampled light, of the lobes that the light is visible to.
 inline LobeEval eval_for_light(const Bsdf& bsdf, Vec3 wo, const LightSample& light) {
   LobeEval e = bsdf.eval(wo, light.wi);
-  if (light.diffuse_scale == 1 && light.glossy_scale == 1 && light.transmission_scale == 1) return e;
-  const bool below = dot(bsdf.geometric_normal(), light.wi) < 0.0f;
-  if (below) {
-    e.value *= light.transmission_scale;
-  } else {
-    e.value = bsdf.eval(wo, light.wi, kReflection | kDiffuse).value * light.diffuse_scale +
-              bsdf.eval(wo, light.wi, kReflection | kGlossy).value * light.glossy_scale;
+  const auto sees = [&](uint32_t kind) { return (light.visibility & kind) == kind; };
+  if (sees(kRayDiffuse | kRayGlossy | kRayTransmission)) return e;
+  if (dot(bsdf.geometric_normal(), light.wi) < 0.0f) {
+    if (!sees(kRayTransmission)) e.value = Rgb();
+  } else if (!sees(kRayDiffuse | kRayGlossy)) {
+    e.value = sees(kRayDiffuse)  ? bsdf.eval(wo, light.wi, kReflection | kDiffuse).value
+              : sees(kRayGlossy) ? bsdf.eval(wo, light.wi, kReflection | kGlossy).value
+                                 : Rgb();
   }
   return e;
 }
