@@ -213,4 +213,5 @@ def ctrl_c(wishes: Control):
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        # The program's own handler, which Python knows only as None, cannot be put back.
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)

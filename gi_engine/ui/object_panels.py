@@ -133,13 +133,24 @@ class GI_MATERIAL_PT_displacement(MaterialPanel, bpy.types.Panel):
         draw_nodes(self.layout, context.material, "Displacement")
 
 
-class GI_WORLD_PT_surface(Panel, bpy.types.Panel):
-    bl_label = "Surface"
+class WorldPanel(Panel):
     bl_context = "world"
 
     @classmethod
     def poll(cls, context):
         return super().poll(context) and context.world is not None
+
+
+class GI_WORLD_PT_preview(WorldPanel, bpy.types.Panel):
+    bl_label = "Preview"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        self.layout.template_preview(context.world)
+
+
+class GI_WORLD_PT_surface(WorldPanel, bpy.types.Panel):
+    bl_label = "Surface"
 
     def draw(self, context):
         draw_nodes(self.layout, context.world, "Surface", "color")
@@ -170,17 +181,15 @@ class GI_OBJECT_PT_visibility(Panel, bpy.types.Panel):
             columns(self.layout, heading="Mask").prop(item, "is_holdout")
 
 
-class WorldPanel(Panel):
+class CyclesWorldPanel(WorldPanel):
     """What Cycles keeps of a world, where its add-on is switched on."""
-
-    bl_context = "world"
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and getattr(context.world, "cycles", None) is not None
+        return super().poll(context) and hasattr(context.world, "cycles")
 
 
-class GI_WORLD_PT_settings(WorldPanel, bpy.types.Panel):
+class GI_WORLD_PT_settings(CyclesWorldPanel, bpy.types.Panel):
     bl_label = "Settings"
     bl_options = {"DEFAULT_CLOSED"}
 
@@ -193,7 +202,7 @@ class GI_WORLD_PT_settings(WorldPanel, bpy.types.Panel):
         draw_cycles(column, cycles, ("max_bounces",))
 
 
-class GI_WORLD_PT_visibility(WorldPanel, bpy.types.Panel):
+class GI_WORLD_PT_visibility(CyclesWorldPanel, bpy.types.Panel):
     bl_label = "Ray Visibility"
     bl_options = {"DEFAULT_CLOSED"}
 
@@ -246,6 +255,7 @@ CLASSES = (
     GI_MATERIAL_PT_displacement,
     GI_MATERIAL_PT_settings,
     GI_OBJECT_PT_visibility,
+    GI_WORLD_PT_preview,
     GI_WORLD_PT_surface,
     GI_WORLD_PT_settings,
     GI_WORLD_PT_visibility,

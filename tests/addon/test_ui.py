@@ -43,6 +43,9 @@ class Layout:
     def label(self, **_):
         pass
 
+    def template_preview(self, item):
+        self.drawn.append(item.name)
+
     def template_node_view(self, tree, node, socket):
         assert node in tree.nodes[:] and socket in node.inputs[:]
         self.drawn.append(socket.name)

@@ -219,3 +219,18 @@ def test_ctrl_c_before_rendering(stage, tmp_path):
     assert (done.returncode, done.stdout) == (cli.CANCELLED, "")
     assert "nothing is written" in done.stderr
     assert not out.exists()
+
+
+def test_ctrl_c_where_the_program_has_a_handler_of_its_own(monkeypatch):
+    """As Blender has: Python knows it as None, and refuses to put it back."""
+    handlers = []
+    real = signal.signal
+    monkeypatch.setattr(cli.signal, "signal", lambda number, handler: handlers.append(real(number, handler)))
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        with cli.ctrl_c(control.Control()):
+            pass
+        assert handlers[0] is before and len(handlers) == 2
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_DFL
+    finally:
+        real(signal.SIGINT, before)
