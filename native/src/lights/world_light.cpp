@@ -15,40 +15,49 @@ constexpr float kBright = 32.0f;        // times the mean
 constexpr size_t kMostFine = 4096;      // bright texels
 constexpr float kFloor = 0.02f;         // of the mean, everywhere: what lies between the map's samples is not ruled out
 
-float strength(const Scene& scene, float x, float y) {
-  const float theta = kPi * y, phi = 2.0f * kPi * x - kPi, s = std::sin(theta);
+float strength(const Scene& scene, Vec3 direction) {
   PathState path;
   path.kind = 0, path.depth = 1;
-  const Rgb l = scene.world_radiance({s * std::cos(phi), s * std::sin(phi), -std::cos(theta)}, path);
+  const Rgb l = scene.world_radiance(direction, path);
   const float value = std::abs(luminance(l));
   return std::isfinite(value) ? value : 0.0f;
+}
+
+Vec2 circle(float angle) { return {std::cos(angle), std::sin(angle)}; }
+
+float strength(const Scene& scene, float x, float y) {
+  const Vec2 theta = circle(kPi * y), phi = circle(2.0f * kPi * x - kPi);
+  return strength(scene, {theta.y * phi.x, theta.y * phi.y, -theta.x});
 }
 
 // |luminance| of width × width/2 texels, `subsamples`² samples in each.
 std::vector<float> radiance_map(const Scene& scene, int width, int subsamples, ThreadPool& pool) {
   const int height = width / 2, n = subsamples;
   std::vector<float> map(size_t(width) * size_t(height));
+  std::vector<Vec2> phi(size_t(width * n));
+  for (size_t i = 0; i < phi.size(); ++i) phi[i] = circle(kPi * (2.0f * (float(i) + 0.5f) / float(phi.size()) - 1.0f));
   const std::atomic<bool> go_on{false};
   pool.for_each(height, go_on, [&](int y) {
-    for (int x = 0; x < width; ++x) {
-      float sum = 0;
-      for (int k = 0; k < n * n; ++k) {
-        sum += strength(scene, (float(x) + (float(k % n) + 0.5f) / float(n)) / float(width),
-                        (float(y) + (float(k / n) + 0.5f) / float(n)) / float(height));
+    for (int j = y * n; j < (y + 1) * n; ++j) {
+      const Vec2 theta = circle(kPi * (float(j) + 0.5f) / float(height * n));
+      for (int i = 0; i < width * n; ++i) {
+        const Vec3 direction{theta.y * phi[size_t(i)].x, theta.y * phi[size_t(i)].y, -theta.x};
+        map[size_t(y) * size_t(width) + size_t(i / n)] += strength(scene, direction) / float(n * n);
       }
-      map[size_t(y) * size_t(width) + size_t(x)] = sum / float(n * n);
     }
   });
   return map;
 }
 
-// Fine enough for the sun in a panorama, if the scene has one; half its width, as each texel is sampled twice across.
-int automatic_width(const Scene& scene) {
-  int width = kLeastWidth;
+// Width of the widest image that the world shows; 0: none.
+int image_width(const Scene& scene, const Program& program) {
+  int width = 0;
   const ImageSet* images = scene.resources().images.get();
-  for (size_t i = 0; images && i < images->size(); ++i)
-    width = std::max(width, (*images)[i].tiles.empty() ? 0 : (*images)[i].tiles[0].width / 2);
-  return std::min(width, kMostWidth);
+  for (const char* op : {"environment", "image", "image_box"})
+    for (const int32_t i : program.immediates(op, 0))
+      if (images && size_t(i) < images->size() && !(*images)[size_t(i)].tiles.empty())
+        width = std::max(width, (*images)[size_t(i)].tiles[0].width);
+  return width;
 }
 
 float mean_over_sphere(const std::vector<float>& map, int width) {
@@ -79,8 +88,11 @@ WorldLight::WorldLight(const Scene& scene, int threads) {
   std::vector<float> map = radiance_map(scene, width, 2, pool);
   const auto [least, most] = std::minmax_element(map.begin(), map.end());
   if (world.map_resolution > 0 || *least != *most || *most == 0.0f) {
-    width = std::clamp(world.map_resolution > 0 ? world.map_resolution : automatic_width(scene), 4, 8192) & ~1;
-    map = radiance_map(scene, width, 2, pool);
+    // Fine enough for the sun in a panorama; half its width, as each texel is sampled twice across.
+    const int image = image_width(scene, program.emission_program());
+    const int automatic = std::clamp(image / 2, kLeastWidth, kMostWidth);
+    width = std::clamp(world.map_resolution > 0 ? world.map_resolution : automatic, 4, 8192) & ~1;
+    map = radiance_map(scene, width, image == 0 && width >= 2 * kLeastWidth ? 1 : 2, pool);
   } else {
     mean_ = *most;
     return;  // depends on the point in name only
