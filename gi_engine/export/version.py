@@ -8,6 +8,11 @@ def voronoi_hashes_floats() -> bool:
     return bpy.app.version < (5, 0, 0)
 
 
+def normal_maps_take_short_normals() -> bool:
+    """Up to Blender 4.5 Cycles makes the frame of a normal map from the interpolated normal as it is, shorter than one."""
+    return bpy.app.version < (5, 0, 0)
+
+
 def straight_floats_are_associated() -> bool:
     """Up to Blender 4.5 Cycles takes the colours of float images for multiplied by alpha, however they are marked."""
     return bpy.app.version < (5, 0, 0)

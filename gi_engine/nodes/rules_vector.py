@@ -81,10 +81,13 @@ def normal(b):
 
 @rule("ShaderNodeNormalMap")
 def normal_map(b):
+    from ..export.version import normal_maps_take_short_normals  # needs bpy
+
     color, strength, space = b.input("Color"), b.input("Strength"), b.node.space
     green = getattr(b.node, "convention", "OPENGL") == "DIRECTX"
     if space == "TANGENT":
-        result = b.op("normal_map_tangent", color, strength, imm=(b.attribute(b.node.uv_map), green))
+        imm = (b.attribute(b.node.uv_map), green, not normal_maps_take_short_normals())
+        result = b.op("normal_map_tangent", color, strength, imm=imm)
     else:
         result = b.op(
             "normal_map_space", color, strength, imm=(space.endswith("OBJECT"), space.startswith("BLENDER"), green)

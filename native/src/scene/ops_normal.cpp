@@ -16,7 +16,8 @@ Vec3 map_color(const Operands& o, int i, bool invert_green) {
 
 void set_or_keep(const Operands& o, const ShadeState& s, Vec3 n) { o.set(0, n == Vec3{} || !is_finite(n) ? s.point.ns : n); }
 
-// colour, strength; UV slot, green goes down. The frame is that of the UV map, about the interpolated normal.
+// colour, strength; UV slot, green goes down, the normal is made unit first. The frame is that of the UV map, about the interpolated
+// normal.
 void normal_map_tangent(const Operands& o, ShadeState& s) {
   const ShadingPoint& p = s.point;
   const auto tangent = instance_of(s) ? s.resources.scene->uv_tangent(p, o.imm(3)) : std::nullopt;
@@ -25,7 +26,7 @@ void normal_map_tangent(const Operands& o, ShadeState& s) {
   const float strength = o.f(2);
   c = {c.x * strength, c.y * strength, lerp(1.0f, c.z, clamp01(strength))};
   // In object space, where the normal is as it was before it was turned towards the viewer.
-  const Vec3 n = s.resources.scene->smooth_object_normal(p), t = tangent->direction;
+  const Vec3 smooth = s.resources.scene->smooth_object_normal(p), n = o.imm(5) ? normalize(smooth) : smooth, t = tangent->direction;
   const Vec3 mapped = normal_to_world(s, normalize(c.x * t + c.y * tangent->side * cross(n, t) + c.z * n));
   set_or_keep(o, s, p.backfacing ? -mapped : mapped);
 }
@@ -153,7 +154,7 @@ void tangent_radial(const Operands& o, ShadeState& s) {
 }
 
 const Op kOps[] = {
-    {"normal_map_tangent", "v", "vf", 2, OpKind::kContext, normal_map_tangent},
+    {"normal_map_tangent", "v", "vf", 3, OpKind::kContext, normal_map_tangent},
     {"normal_map_space", "v", "vf", 3, OpKind::kContext, normal_map_space},
     {"bump_shift", "vvv", "f", 1, OpKind::kShift, bump_shift},
     {"bump_restore", "", "vvv", 0, OpKind::kRestore, bump_restore},

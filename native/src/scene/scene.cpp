@@ -403,7 +403,7 @@ Vec3 Scene::smooth_object_normal(const ShadingPoint& point) const {
   const float w[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
   Vec3 sum;
   for (int k = 0; k < 3; ++k) sum += w[k] * corner_normal(mesh, point.triangle, k);
-  return normalize_or(sum, flat);
+  return sum == Vec3{} ? flat : sum;
 }
 
 std::optional<CornerTangent> Scene::uv_tangent(const ShadingPoint& point, int slot) const {

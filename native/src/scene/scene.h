@@ -71,7 +71,7 @@ class Scene {
   // and instancer attributes. Returns how many components it has; 0 if the object has none. Missing components: 0, alpha 1.
   int attribute(const ShadingPoint& point, int slot, float out[4]) const;
   bool active_uv(const ShadingPoint& point, float out[4]) const;  // the UV map that renders by default
-  // Interpolated, unit, object space, not turned to the viewer; flat where the mesh has no normals.
+  // Interpolated but not made unit, object space, not turned to the viewer; flat where the mesh has no normals.
   Vec3 smooth_object_normal(const ShadingPoint& point) const;
   // The tangent of the UV map in slot `slot`, interpolated but not made unit, object space. For the slots that ops of the
   // object's materials take tangents of; null if the object has no such map.
