@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 import traceback
 
@@ -23,8 +24,14 @@ STATUS_SECONDS = 0.5 if WINDOW else 5.0
 SHOW_SECONDS, SHOW_SECONDS_LATER = 0.25, 3.0
 USER_ERRORS = (ExportError, RenderFailed, native.NativeMissing)
 
+LEAVE_SECONDS = 10.0  # that a render has to stop when the add-on is switched off
+
 # Said once in an animation, not once a frame.
 _reported: set[str] = set()
+# One entry for each render that is running, on threads of Blender's. Switching the add-on off has to end them first:
+# Blender crashes when a class goes while its render runs.
+_running: list[str] = []
+_leaving = threading.Event()
 
 
 class GIEngine(bpy.types.RenderEngine):
@@ -61,9 +68,12 @@ class GIEngine(bpy.types.RenderEngine):
         return found
 
     def render(self, depsgraph):
-        views = [view.name for view in self.views()] or [""]
-        for view in views:
-            self.render_view(depsgraph, view)
+        _running.append(depsgraph.view_layer.name)
+        try:
+            for view in [view.name for view in self.views()] or [""]:
+                self.render_view(depsgraph, view)
+        finally:
+            _running.pop()
 
     def views(self) -> list:
         result = self.get_result()
@@ -124,7 +134,7 @@ class GIEngine(bpy.types.RenderEngine):
             self.warn(f"{progress['bad_samples']} samples were not finite numbers and were left out")
 
     def stopped(self) -> bool:
-        return self.test_break() or control.cancelled()
+        return _leaving.is_set() or self.test_break() or control.cancelled()
 
     def show(self, session: Session, result) -> None:
         for blender_pass in result.layers[0].passes:
@@ -209,13 +219,26 @@ def forget_warnings(*_):
 HANDLERS = (bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel, bpy.app.handlers.load_post)
 
 
+def stop_renders() -> None:
+    """Ends the renders that are running, and waits until Blender has taken them back."""
+    if not _running:
+        return
+    _leaving.set()
+    end = time.monotonic() + LEAVE_SECONDS
+    while _running and time.monotonic() < end:
+        time.sleep(0.05)
+    time.sleep(0.2)  # from the end of render() until Blender lets go of the engine
+
+
 def register() -> None:
+    _leaving.clear()
     bpy.utils.register_class(GIEngine)
     for handlers in HANDLERS:
         handlers.append(forget_warnings)
 
 
 def unregister() -> None:
+    stop_renders()
     for handlers in HANDLERS:
         handlers.remove(forget_warnings)
     bpy.utils.unregister_class(GIEngine)

@@ -63,7 +63,12 @@ def fixed_properties() -> dict:
             min=0,
             max=1,
         ),
-        "pixel_filter": EnumProperty(name="Pixel Filter", items=FILTERS, default="BLACKMAN_HARRIS"),
+        "pixel_filter": EnumProperty(
+            name="Pixel Filter",
+            description="How samples are weighed by their distance from the pixel's centre",
+            items=FILTERS,
+            default="BLACKMAN_HARRIS",
+        ),
         "filter_width": FloatProperty(
             name="Filter Width", description="Width of the pixel filter", default=1.5, min=0.01, max=10, subtype="PIXEL"
         ),

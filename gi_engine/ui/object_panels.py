@@ -177,8 +177,6 @@ class GI_OBJECT_PT_visibility(Panel, bpy.types.Panel):
         column = columns(self.layout)
         for name in names:
             column.prop(item, f"visible_{name}", text=name.title())
-        if item.type != "LIGHT":
-            columns(self.layout, heading="Mask").prop(item, "is_holdout")
 
 
 class CyclesWorldPanel(WorldPanel):

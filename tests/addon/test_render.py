@@ -369,6 +369,23 @@ def test_rendering_leaves_pythons_other_threads_running(plane, watched):
     assert len(ticks) > 15 and np.diff(ticks).max() < 0.4
 
 
+def test_switching_the_add_on_off_ends_a_render(plane, watched, monkeypatch):
+    """From another thread, as the window does while the render's own thread runs."""
+
+    def leave(progress):
+        if progress.passes and not threads:
+            threads.append(threading.Thread(target=engine.stop_renders))
+            threads[0].start()
+
+    threads = []
+    watched.on_progress = leave
+    plane.cycles.samples = 1 << 20
+    bpy.ops.render.render()
+    threads[0].join(5.0)
+    assert not threads[0].is_alive() and not engine._running
+    engine._leaving.clear()
+
+
 # ------------------------------------------------------------------ previews
 
 
