@@ -186,7 +186,12 @@ def principled_top(b) -> tuple:
 def principled_emission(b, weight, alpha, base_normal, top) -> None:
     """Emits only where there is something to emit: every emitting triangle becomes a light."""
     color, strength = b.input("Emission Color"), b.input("Emission Strength")
-    if not is_zero(b, color) and not is_zero(b, strength):
+    if is_zero(b, color) or is_zero(b, strength):
+        return
+    covered = not (is_zero(b, b.input("Coat Weight")) and is_zero(b, b.input("Sheen Weight")))
+    if number(b, alpha) == 1.0 and not covered:
+        b.op("emission", weight, color, strength)
+    else:
         b.op("principled_emission", weight, alpha, base_normal, *top, color, strength)
 
 

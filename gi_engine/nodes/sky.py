@@ -33,6 +33,12 @@ def unit(direction: tuple) -> np.ndarray:
     return np.array(direction) / (np.linalg.norm(direction) or 1.0)
 
 
+def direction_of(theta: float, sun: np.ndarray) -> tuple[float, float, float]:
+    """The direction at `theta` from the zenith with the azimuth of `sun`."""
+    phi = math.atan2(sun[0], sun[1])
+    return math.sin(theta) * math.sin(phi), math.sin(theta) * math.cos(phi), math.cos(theta)
+
+
 # -------------------------------------------------------------------- Hosek and Wilkie
 
 
@@ -40,7 +46,7 @@ def hosek_wilkie(sun: np.ndarray, turbidity: float, albedo: float) -> np.ndarray
     """The floats of the native SunnyHosekWilkieSky for a sun in the direction `sun`, at the horizon if it has set."""
     theta = min(math.acos(min(max(sun[2], -1.0), 1.0)), math.pi / 2)
     numbers = native.module().sky_hosek_wilkie(turbidity, albedo, math.pi / 2 - theta)
-    return np.array([theta, math.atan2(sun[0], sun[1]), *numbers], np.float32)
+    return np.array([*direction_of(theta, sun), *numbers], np.float32)
 
 
 # -------------------------------------------------------------------- scattering
@@ -56,7 +62,9 @@ def scattering(b, direction):
     pixels, bottom, top = sky_table(*model)
     image = b.image(("sky", *model), lambda: [Image("sky", pixels, alpha="NONE")])
     horizon = -(math.pi / 2 - math.asin(EARTH_RADIUS / (EARTH_RADIUS + max(n.altitude, 0.0))))
-    disc = (*bottom, *top, elevation, rotation, size if n.sun_disc else -1.0, n.sun_intensity, horizon)
+    sun = (-math.cos(elevation) * math.sin(rotation), math.cos(elevation) * math.cos(rotation), math.sin(elevation))
+    reach = math.cos(min(0.5 * size + 1e-3, math.pi)) if n.sun_disc else 2.0  # a little wide: floats are coarse there
+    disc = (*bottom, *top, elevation, rotation, *sun, reach, size, n.sun_intensity, horizon)
     return b.op("sky", direction, imm=(image, b.table(disc)), kind=COLOR)
 
 
@@ -100,7 +108,7 @@ def preetham(sun: np.ndarray, turbidity: float) -> np.ndarray:
     luminance = ((4.0453 * turbidity - 4.9710) * math.tan(chi) - 0.2155 * turbidity + 2.4192) * LUMINANCE_SCALE
     powers = np.array([theta**3, theta**2, theta, 1.0])
     chromaticity = [float(np.array([turbidity**2, turbidity, 1.0]) @ np.array(rows) @ powers) for rows in ZENITH]
-    table = [theta, math.atan2(sun[0], sun[1])]
+    table = [*direction_of(theta, sun)]
     for zenith, slopes in zip((luminance, *chromaticity), PEREZ, strict=True):
         a, b, c, d, e = (slope * turbidity + offset for slope, offset in slopes)
         at_zenith = (1.0 + a * math.exp(b)) * (1.0 + c * math.exp(d * theta) + e * math.cos(theta) ** 2)

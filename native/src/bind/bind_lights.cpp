@@ -121,7 +121,7 @@ class TestLights {
     const PathState path;
     while (const auto hit = scene_->intersect(ray, visibility)) {
       ShadingPoint point = scene_->shading_point(ray, *hit, path);
-      add({scene_->emission(point), lights_->pdf_triangle(query, point, hit->t)});
+      add({scene_->emission(point), lights_->pdf_triangle(query, point)});
       ray.t_min = hit->t * 1.00001f + 1e-6f;
     }
     if (scene_->data().world.visibility & visibility) {

@@ -147,7 +147,7 @@ struct Mix {
     bsdf.transparency = Rgb(vec(transparency));
   }
   void add(const std::string& name, const Values& values, std::vector<float> weight, std::vector<float> normal) {
-    bsdf.add(Rgb(vec(weight)), make_lobe(name, {values}), Frame::from_normal(vec(normal)));
+    std::visit([&](const auto& lobe) { bsdf.add(Rgb(vec(weight)), lobe, Frame::from_normal(vec(normal))); }, make_lobe(name, {values}));
   }
   // Columns as lobe_eval and lobe_sample; a single wo.
   Output eval(std::vector<float> wo, Input wi, int flags) {

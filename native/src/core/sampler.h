@@ -1,5 +1,5 @@
 // Random numbers keyed by (seed, pass, pixel or light path, dimension): padded (0,2)-sequences, Owen-scrambled and
-// shuffled [Burley 2020, "Practical hash-based Owen scrambling"], made in batches of eight dimension pairs.
+// shuffled [Burley 2020, "Practical hash-based Owen scrambling"], made in batches of four dimension pairs.
 #pragma once
 #include "core/vec.h"
 
@@ -24,22 +24,26 @@ class Sampler {
   Sampler(uint32_t seed, uint32_t stream, uint32_t index) : index_(reverse_bits(index)), key_(hash_combine(seed, stream)) {}
 
   Vec2 next_2d() {
-    if ((dimension_ & 7u) == 0) fill();
-    const uint32_t k = dimension_++ & 7u;
+    const uint32_t k = dimension_++ & kMask;
+    if (k == 0) fill();
     return {x_[k], y_[k]};
   }
-  float next_1d() { return next_2d().x; }
+  // Two numbers in a row are the halves of one pair.
+  float next_1d() {
+    if (has_spare_) return has_spare_ = false, spare_;
+    const Vec2 pair = next_2d();
+    has_spare_ = true, spare_ = pair.y;
+    return pair.x;
+  }
   // An independent sequence for a sub-estimate (a splitting branch, a light path of the same index).
   Sampler fork(uint32_t salt) const {
     Sampler s = *this;
-    s.key_ = hash_combine(key_, salt), s.dimension_ = 0;
+    s.key_ = hash_combine(key_, salt), s.dimension_ = 0, s.has_spare_ = false;
     return s;
   }
-  // Moves on to dimension pair `d`: the next bounce starts at the same dimension however many numbers this one used.
-  void jump_to(uint32_t d) {
-    dimension_ = d;
-    if (d & 7u) dimension_ = d & ~7u, fill(), dimension_ = d;
-  }
+  // Moves on to batch `b` of dimension pairs: a bounce starts there however many numbers
+  // the one before used. The camera has batch 0.
+  void jump_to(uint32_t b) { dimension_ = b * kBatch, has_spare_ = false; }
 
  private:
   // Laine–Karras permutation in the reversed-bit domain, constants by Vegdahl (2022).
@@ -53,8 +57,9 @@ class Sampler {
     return v ^ ((v << 1) & 0xaaaaaaaau);
   }
   void fill() {
-    for (uint32_t k = 0; k < 8; ++k) {
-      const uint32_t h = hash32(key_ ^ ((dimension_ + k) * 0x9e3779b9u));
+    const uint32_t first = dimension_ & ~kMask;
+    for (uint32_t k = 0; k < kBatch; ++k) {
+      const uint32_t h = hash32(key_ ^ ((first + k) * 0x9e3779b9u));
       uint32_t hx = h * 0x85ebca6bu + 0x3c6ef372u, hy = h * 0xc2b2ae35u + 0x1b873593u;
       hx ^= hx >> 15, hy ^= hy >> 15;
       const uint32_t shuffled = permute(index_, h);
@@ -63,8 +68,11 @@ class Sampler {
     }
   }
 
+  static constexpr uint32_t kBatch = 4, kMask = kBatch - 1;  // what one vector register holds
   uint32_t index_, key_, dimension_ = 0;
-  float x_[8], y_[8];
+  bool has_spare_ = false;
+  float spare_ = 0;
+  float x_[kBatch], y_[kBatch];
 };
 
 }  // namespace gi

@@ -15,28 +15,27 @@ struct PassRule {
   const char* name;
   int channels;
   Keep keep;
-  void (*write)(const PixelSample&, float*);
+  void (*write)(const PixelSample&, float exposure, float*);
 };
 
 namespace {
-
-constexpr int kTileSize = 16;
 
 void write_rgb(Rgb c, float* out) { out[0] = c.r, out[1] = c.g, out[2] = c.b; }
 void write_vec(Vec3 v, float* out) { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
 
 const PassRule kPassRules[] = {
-    {"Combined", 4, Keep::kLight, [](const PixelSample& s, float* o) { write_rgb(s.radiance, o), o[3] = s.alpha; }},
-    {"Depth", 1, Keep::kFirst, [](const PixelSample& s, float* o) { o[0] = s.depth; }},
-    {"Position", 3, Keep::kFirst, [](const PixelSample& s, float* o) { write_vec(s.position, o); }},
-    {"Normal", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_vec(s.normal, o); }},
-    {"UV", 3, Keep::kMean, [](const PixelSample& s, float* o) { o[0] = s.uv.x, o[1] = s.uv.y, o[2] = s.has_uv ? 1.0f : 0.0f; }},
-    {"Denoising Albedo", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_rgb(s.albedo, o); }},
-    {"Denoising Normal", 3, Keep::kMean, [](const PixelSample& s, float* o) { write_vec(s.normal, o); }},
-    {"Object Index", 1, Keep::kFirst, [](const PixelSample& s, float* o) { o[0] = s.object_index; }},
-    {"Material Index", 1, Keep::kFirst, [](const PixelSample& s, float* o) { o[0] = s.material_index; }},
-    {"Emission", 3, Keep::kLight, [](const PixelSample& s, float* o) { write_rgb(s.emission, o); }},
-    {"Environment", 3, Keep::kLight, [](const PixelSample& s, float* o) { write_rgb(s.environment, o); }},
+    {"Combined", 4, Keep::kLight,
+     [](const PixelSample& s, float exposure, float* o) { write_rgb(s.radiance * exposure, o), o[3] = s.alpha; }},
+    {"Depth", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { o[0] = s.depth; }},
+    {"Position", 3, Keep::kFirst, [](const PixelSample& s, float, float* o) { write_vec(s.position, o); }},
+    {"Normal", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { write_vec(s.normal, o); }},
+    {"UV", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { o[0] = s.uv.x, o[1] = s.uv.y, o[2] = s.has_uv ? 1.0f : 0.0f; }},
+    {"Denoising Albedo", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { write_rgb(s.albedo, o); }},
+    {"Denoising Normal", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { write_vec(s.normal, o); }},
+    {"Object Index", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { o[0] = s.object_index; }},
+    {"Material Index", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { o[0] = s.material_index; }},
+    {"Emission", 3, Keep::kLight, [](const PixelSample& s, float exposure, float* o) { write_rgb(s.emission * exposure, o); }},
+    {"Environment", 3, Keep::kLight, [](const PixelSample& s, float exposure, float* o) { write_rgb(s.environment * exposure, o); }},
 };
 constexpr const char* kSampleCount = "Debug Sample Count";
 
@@ -70,6 +69,7 @@ Film::Film(FilmSpec spec) : spec_(std::move(spec)), filter_(spec_.filter, spec_.
     if (name == kSampleCount) continue;  // count_ is always there
     const PassRule* rule = find_rule(name);
     require(rule, "there is no pass named '" + name + "'");
+    has_data_passes_ = has_data_passes_ || rule->keep != Keep::kLight;
     layers_.push_back({rule, std::vector<float>(pixels * size_t(rule->channels), 0.0f)});
   }
   count_.assign(pixels, 0), light_count_.assign(pixels, 0);
@@ -77,21 +77,19 @@ Film::Film(FilmSpec spec) : spec_(std::move(spec)), filter_(spec_.filter, spec_.
   luminance_square_sum_.assign(pixels, 0.0f);
 }
 
-void Film::add_tile(int tile, int pass, const std::vector<PixelSample>& samples) {
+void Film::add_tile(int tile, int pass, const PixelSample* samples) {
   const Tile& t = tiles_[size_t(tile)];
   const std::lock_guard lock(tile_mutex_[size_t(tile)]);
-  size_t k = 0;
   for (int y = t.y0; y < t.y1; ++y)
-    for (int x = t.x0; x < t.x1; ++x) add_sample(size_t(y) * size_t(spec_.region_width()) + size_t(x), pass == 0, samples[k++]);
+    for (int x = t.x0; x < t.x1; ++x) add_sample(size_t(y) * size_t(spec_.region_width()) + size_t(x), pass == 0, *samples++);
 }
 
-void Film::add_sample(size_t pixel, bool first, PixelSample s) {
+void Film::add_sample(size_t pixel, bool first, const PixelSample& s) {
   ++count_[pixel];
-  s.radiance *= spec_.exposure, s.emission *= spec_.exposure, s.environment *= spec_.exposure;
-  const bool good = is_finite(s.radiance) && std::isfinite(s.alpha);
+  const bool good = is_finite(s.radiance * spec_.exposure) && std::isfinite(s.alpha);
   if (good) {
     ++light_count_[pixel];
-    const float y = luminance(s.radiance);
+    const float y = luminance(s.radiance) * spec_.exposure;
     luminance_sum_[pixel] += y;
     luminance_square_sum_[pixel] += y * y;
   } else {
@@ -100,7 +98,7 @@ void Film::add_sample(size_t pixel, bool first, PixelSample s) {
   for (Layer& layer : layers_) {
     if (layer.rule->keep == Keep::kLight && !good) continue;
     float value[4];
-    layer.rule->write(s, value);
+    layer.rule->write(s, spec_.exposure, value);
     const int n = layer.rule->channels;
     float* sum = layer.sum.data() + pixel * size_t(n);
     if (layer.rule->keep == Keep::kFirst) {

@@ -52,8 +52,11 @@ class Film {
   const PixelFilter& filter() const { return filter_; }
   const std::vector<Tile>& tiles() const { return tiles_; }
 
+  static constexpr int kTileSize = 16;
+  // Whether anything but light is asked for.
+  bool has_data_passes() const { return has_data_passes_; }
   // Adds one sample to each pixel of the tile, row by row.
-  void add_tile(int tile, int pass, const std::vector<PixelSample>& samples);
+  void add_tile(int tile, int pass, const PixelSample* samples);
 
   // Mean of a pass, (region height × region width × channels); "Sample Count" is the number itself.
   static int channels(const std::string& pass);  // 0 if there is no such pass
@@ -70,12 +73,13 @@ class Film {
     const PassRule* rule;
     std::vector<float> sum;
   };
-  void add_sample(size_t pixel, bool first, PixelSample sample);
+  void add_sample(size_t pixel, bool first, const PixelSample& sample);
 
   FilmSpec spec_;
   PixelFilter filter_;
   std::vector<Tile> tiles_;
   std::vector<Layer> layers_;
+  bool has_data_passes_ = false;
   std::vector<uint32_t> count_, light_count_;  // samples; those whose light is a finite number
   std::vector<float> luminance_sum_, luminance_square_sum_;
   std::unique_ptr<std::mutex[]> tile_mutex_;

@@ -1,13 +1,11 @@
 // What an integrator is: passes that each add one estimate of the whole image. A new one is one .cpp file with its
 // descriptor at the end, and one line in registry.cpp; panels, options and tests come from the descriptor.
 #pragma once
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "core/sampler.h"
 #include "film/film.h"
 #include "transport/render_context.h"
 
@@ -62,9 +60,5 @@ struct Descriptor {
 
 const std::vector<Descriptor>& integrators();
 const Descriptor& find_integrator(const std::string& id);  // throws InputError naming the valid ids
-
-// Calls f(camera ray, sampler) for every pixel of the film and adds what it returns, tile by tile in threads.
-using PixelFunction = std::function<PixelSample(const CameraRay&, Sampler&)>;
-void for_each_pixel(const RenderContext& context, int pass, Film& film, const PixelFunction& f);
 
 }  // namespace gi

@@ -1,17 +1,13 @@
 // Path tracing [Kajiya 1986] with Russian roulette and multiple importance sampling [Veach 1997].
 // Each bounce: continue with probability α; draw ω from P; weigh by ρbd cos θ / (P(ω) α); add Le where a luminaire is met.
 #include "integrators/integrator.h"
-#include "transport/direct_light.h"
-#include "transport/first_hit.h"
+#include "transport/camera_path.h"
 
 namespace gi {
 namespace {
 
 enum class DirectionSampling { kUniform, kCosine, kBsdf };
 enum class Continuation { kAlbedo, kThroughput, kConstant };
-
-// One bounce takes at most this many dimension pairs, so that later bounces stay stratified.
-constexpr uint32_t kPairsPerBounce = 8;
 
 struct PathSettings {
   LightSampling light_sampling;
@@ -78,110 +74,85 @@ class PathIntegrator final : public Integrator {
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     for_each_pixel(context, pass, film,
-                   [&](const CameraRay& camera, Sampler& sampler) { return trace(context, film.spec(), camera, sampler); });
+                   [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) { trace(context, film, camera, sampler, result); });
   }
 
  private:
-  PixelSample trace(const RenderContext& context, const FilmSpec& film, const CameraRay& camera, Sampler& sampler) const {
-    static thread_local Bsdf bsdf;
-    PixelSample result;
-    Ray ray = camera.ray;
-    PathState path;
-    RayOrigin origin;
-    Rgb throughput(1.0f);
-    float travelled = 0;            // along the path, for the footprint
-    float least_pdf = kInf;         // of the directions so far, per steradian
-    bool may_scatter = true;        // false past the bounce limit: the next surface only emits
-    bool seen_from_camera = true;   // nothing but transparent surfaces so far: what is not covered makes holes in alpha
-    origin.query.path = path;
+  void trace(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler, PixelSample& result) const {
+    const LightSampling mode = s_.light_sampling;
+    Bsdf bsdf;
+    CameraPath path(camera);
+    bool may_scatter = true;  // false past the bounce limit: the next surface only emits
+    float least_pdf = kInf;   // of the directions so far, per steradian
 
     const auto add = [&](Rgb radiance, int depth) {
-      result.radiance += clamp_contribution(throughput * radiance, depth > 1 ? s_.clamp_indirect : s_.clamp_direct);
+      result.radiance += clamp_contribution(path.throughput * radiance, depth > 1 ? s_.clamp_indirect : s_.clamp_direct);
     };
 
     for (uint32_t bounce = 0;; ++bounce) {
-      sampler.jump_to((bounce + 1) * kPairsPerBounce);
-      const uint32_t visibility = visibility_of(path.kind);
-      const auto hit = context.scene.intersect(ray, visibility);
+      sampler.jump_to(bounce + 1);
+      const uint32_t visibility = visibility_of(path.state.kind);
+      const auto hit = context.scene.intersect(path.ray, visibility);
 
       // Lamps do not block the ray.
-      add(lamps_along(context, ray, hit ? hit->t : kInf, origin, s_.light_sampling, visibility), path.depth);
-
-      // Leave the scene: suns and the world.
+      add(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, mode, visibility), path.state.depth);
       if (!hit) {
-        const Rgb beyond = light_beyond(context, ray, origin, s_.light_sampling, path);
-        if (seen_from_camera && film.transparent) {
-          result.alpha -= average(throughput);
-        } else {
-          if (seen_from_camera) result.environment += throughput * beyond;
-          add(beyond, path.depth);
-        }
+        add(path.leave(context, film, mode, result), path.state.depth);
         break;
       }
 
-      ShadingPoint point = context.scene.shading_point(ray, *hit, path, camera.footprint + camera.spread * (travelled + hit->t));
-      context.scene.shade(point, bsdf);
+      const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
       // The less likely the path, the less sharp what it sees: as Blender's Filter Glossy does it.
       if (least_pdf < s_.filter_glossy) bsdf.blur(0.5f * std::sqrt(1.0f - least_pdf / s_.filter_glossy));
-      if (path.depth == 0) record_surface(context, point, bsdf, result);
-
-      // Cut out what is held out.
-      if (seen_from_camera) {
-        if (context.scene.instances()[point.instance].data->holdout) bsdf.hold_out();
-        result.alpha -= average(throughput * bsdf.holdout);
-      }
 
       // Add what the surface emits, then what lights send to it.
-      const Rgb emitted = surface_emission(context, point, bsdf, origin, s_.light_sampling, hit->t);
-      if (path.depth == 0) result.emission += throughput * emitted;
-      add(emitted, path.depth);
+      const Rgb emitted = surface_emission(context, point, bsdf.emission, path.origin, mode);
+      if (path.state.depth == 0) result.emission += path.throughput * emitted;
+      add(emitted, path.state.depth);
+      const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
+      const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
       if (may_scatter) {
-        const float u_choice = sampler.next_1d();
-        const Vec2 u_light = sampler.next_2d();
         const auto pdf_of = [&](Vec3 wi, const LobeEval& e) {
           return s_.direction_sampling == DirectionSampling::kBsdf ? e.pdf_dir : pdf_direction(bsdf, point, s_.direction_sampling, wi);
         };
-        add(sample_direct_light(context, point, bsdf, s_.light_sampling, u_choice, u_light, pdf_of), path.depth + 1);
+        add(sample_direct_light(context, point, bsdf, mode, u_light_choice, u_light, pdf_of), path.state.depth + 1);
       }
 
       // Draw the next direction.
-      const Vec2 u = sampler.next_2d();
-      const float u_lobe = sampler.next_1d();
       const auto next = sample_direction(bsdf, point, s_.direction_sampling, u, u_lobe);
       if (!next || !(next->pdf_dir > 0.0f)) break;
       const bool transparent = next->flags & kTransparent;
       if (!may_scatter && !transparent) break;
       const Rgb weight = next->value / next->pdf_dir;
-      throughput *= weight;
-      if (is_black(throughput)) break;
+      path.throughput *= weight;
+      if (is_black(path.throughput)) break;
 
       // Follow it. A transparent surface changes nothing but the throughput: the ray goes on as the one it was.
+      path.travelled += hit->t;
       if (transparent) {
-        if (!advance(path, next->flags, s_.limits)) break;
-        travelled += hit->t;
-        const float left = ray.t_max - hit->t;
-        ray = {offset_point(point.position, point.ng, ray.direction), ray.direction, 0.0f, left};
-        origin.query.path = path;
+        if (!advance(path.state, next->flags, s_.limits)) break;
+        const float left = path.ray.t_max - hit->t;
+        path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, left};
+        path.origin.query.path = path.state;
         continue;
       }
-      may_scatter = advance(path, next->flags, s_.limits);
-      const bool through_glass = film.transparent_glass && (next->flags & kTransmission) && next->roughness <= film.transparent_roughness;
-      if (!through_glass) seen_from_camera = false;
-      path.without = next->flags & kDiffuse ? no_caustics() : 0;
+      may_scatter = advance(path.state, next->flags, s_.limits);
+      const FilmSpec& spec = film.spec();
+      const bool through_glass = spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness;
+      if (!through_glass) path.seen_from_camera = false;
+      path.state.without = next->flags & kDiffuse ? no_caustics() : 0;
       const bool delta = next->flags & kSpecular;
-      origin = {light_query(point, bsdf), delta ? kInf : next->pdf_dir};
+      path.origin = {light_query(point, bsdf), delta ? kInf : next->pdf_dir};
       if (!delta) least_pdf = std::min(least_pdf, next->pdf_dir);
-      travelled += hit->t;
-      ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+      path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
 
       // Russian roulette.
-      const float alpha = continuation_probability(s_, path, throughput, weight);
+      const float alpha = continuation_probability(s_, path.state, path.throughput, weight);
       if (alpha < 1.0f) {
         if (sampler.next_1d() >= alpha) break;
-        throughput *= 1.0f / alpha;
+        path.throughput *= 1.0f / alpha;
       }
     }
-    return result;
   }
 
   uint8_t no_caustics() const {

@@ -1,4 +1,4 @@
-// The list of integrators and what they share: parameters and the walk over pixels.
+// The list of integrators and the reading of their parameters.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -80,29 +80,6 @@ Parameters::Parameters(const std::vector<Parameter>& declared, const std::map<st
     }
     values_[name] = parse(*it, text, "parameter '" + name + "' of integrator '" + integrator + "'");
   }
-}
-
-void for_each_pixel(const RenderContext& context, int pass, Film& film, const PixelFunction& f) {
-  const FilmSpec& spec = film.spec();
-  const Vec2 pixel{1.0f / float(spec.width), 1.0f / float(spec.height)};
-  context.pool.for_each(int(film.tiles().size()), context.cancelled, [&](int index) {
-    const Tile& tile = film.tiles()[size_t(index)];
-    static thread_local std::vector<PixelSample> samples;
-    samples.clear();
-    for (int y = tile.y0; y < tile.y1; ++y) {
-      for (int x = tile.x0; x < tile.x1; ++x) {
-        // Keyed by the place in the full frame: a region shows what the whole picture would.
-        const int px = spec.x0 + x, py = spec.y0 + y;
-        Sampler sampler(context.seed, uint32_t(py) * uint32_t(spec.width) + uint32_t(px), uint32_t(pass));
-        const Vec2 offset = film.filter().sample(sampler.next_2d());
-        const Vec2 lens = sampler.next_2d();
-        const Vec2 at{(float(px) + 0.5f + offset.x) * pixel.x, (float(py) + 0.5f + offset.y) * pixel.y};
-        samples.push_back(f(context.camera.sample(at, pixel, lens), sampler));
-      }
-    }
-    film.add_tile(index, pass, samples);
-    ++context.tiles_done;
-  });
 }
 
 }  // namespace gi

@@ -2,8 +2,7 @@
 // from its centre alone: hard shadows, no light between rough surfaces. Reflection and refraction are not branched but
 // drawn at random over the passes. The world has no centre: it is sampled at random.
 #include "integrators/integrator.h"
-#include "transport/direct_light.h"
-#include "transport/first_hit.h"
+#include "transport/camera_path.h"
 
 namespace gi {
 namespace {
@@ -18,51 +17,34 @@ class WhittedIntegrator final : public Integrator {
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     for_each_pixel(context, pass, film,
-                   [&](const CameraRay& camera, Sampler& sampler) { return trace(context, film.spec(), camera, sampler); });
+                   [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) { trace(context, film, camera, sampler, result); });
   }
 
  private:
-  PixelSample trace(const RenderContext& context, const FilmSpec& film, const CameraRay& camera, Sampler& sampler) const {
-    static thread_local Bsdf bsdf;
-    PixelSample result;
-    Ray ray = camera.ray;
-    PathState path;
-    RayOrigin origin;  // infinitely dense: every luminaire seen counts in full
-    Rgb throughput(1.0f);
-    bool seen_from_camera = true;
+  void trace(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler, PixelSample& result) const {
+    Bsdf bsdf;
+    CameraPath path(camera);  // its origin is infinitely dense: every luminaire seen counts in full
 
     while (true) {
-      const uint32_t visibility = visibility_of(path.kind);
-      const auto hit = context.scene.intersect(ray, visibility);
-      result.radiance += throughput * lamps_along(context, ray, hit ? hit->t : kInf, origin, LightSampling::kOn, visibility);
+      const uint32_t visibility = visibility_of(path.state.kind);
+      const auto hit = context.scene.intersect(path.ray, visibility);
+      result.radiance += path.throughput * lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, LightSampling::kOn, visibility);
       if (!hit) {
-        if (seen_from_camera && film.transparent) {
-          result.alpha -= average(throughput);
-          break;
-        }
-        const Rgb beyond = throughput * light_beyond(context, ray, origin, LightSampling::kOn, path);
-        if (seen_from_camera) result.environment += beyond;
-        result.radiance += beyond;
+        result.radiance += path.throughput * path.leave(context, film, LightSampling::kOn, result);
         break;
       }
-      ShadingPoint point = context.scene.shading_point(ray, *hit, path, camera.footprint + camera.spread * hit->t);
-      context.scene.shade(point, bsdf);
-      if (path.depth == 0) record_surface(context, point, bsdf, result);
-      if (seen_from_camera) {
-        if (context.scene.instances()[point.instance].data->holdout) bsdf.hold_out();
-        result.alpha -= average(throughput * bsdf.holdout);
-      }
-      if (path.depth == 0) result.emission += throughput * bsdf.emission;
-      result.radiance += throughput * (bsdf.emission + light_from_centres(context, point, bsdf, sampler));
+      const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
+      if (path.state.depth == 0) result.emission += path.throughput * bsdf.emission;
+      result.radiance += path.throughput * (bsdf.emission + light_from_centres(context, point, bsdf, sampler));
 
       const auto next = bsdf.sample_delta(point.wo, sampler.next_1d());
-      if (!next || !advance(path, next->flags, limits_)) break;
-      if (!(next->flags & kTransparent)) seen_from_camera = false;
-      throughput *= next->value / next->pdf_dir * bsdf.delta_probability();
-      if (is_black(throughput)) break;
-      ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+      if (!next || !advance(path.state, next->flags, limits_)) break;
+      if (!(next->flags & kTransparent)) path.seen_from_camera = false;
+      path.throughput *= next->value / next->pdf_dir * bsdf.delta_probability();
+      if (is_black(path.throughput)) break;
+      path.travelled += hit->t;
+      path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
     }
-    return result;
   }
 
   static Rgb light_from_centres(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, Sampler& sampler) {

@@ -21,6 +21,7 @@ class LampBvh {
     build(0, 0, uint32_t(items_.size()));
   }
 
+  bool empty() const { return nodes_.empty(); }
   // Calls f(lamp) for every lamp whose bounds the ray's line touches within its range.
   template <class F>
   void visit(const Ray& ray, const F& f) const {

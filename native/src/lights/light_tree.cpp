@@ -83,22 +83,21 @@ LightBounds merge(const LightBounds& a, const LightBounds& b) {
   return r;
 }
 
-float light_importance(const LightBounds& b, const LightQuery& query) {
-  const Vec3 to = query.position - (b.lo + b.hi) * 0.5f;
-  const float d2 = length_squared(to), r2 = 0.25f * length_squared(b.hi - b.lo);
+float light_importance(const LightCluster& b, const LightQuery& query) {
+  const Vec3 to = query.position - b.center;
+  const float d2 = length_squared(to);
   const bool has_normal = length_squared(query.normal) > 0.0f;
-  if (!(d2 > r2)) return b.power / std::max(r2, 1e-12f);  // among the lights every angle is possible
-  const float inverse = 1.0f / std::sqrt(d2), sin_bounds = std::sqrt(r2) * inverse;
-  const float cos_bounds = std::sqrt(std::max(1.0f - sin_bounds * sin_bounds, 0.0f));
-  float importance = b.power * inverse * inverse;
+  if (!(d2 > b.radius2)) return b.power / std::max(b.radius2, 1e-12f);  // among the lights every angle is possible
+  const float inverse2 = 1.0f / d2, inverse = std::sqrt(inverse2), sin2_bounds = b.radius2 * inverse2;
+  const float sin_bounds = std::sqrt(sin2_bounds), cos_bounds = safe_sqrt(1.0f - sin2_bounds);
+  float importance = b.power * inverse2;
 
   // The least angle to a normal, over all the cluster's places and normals: θ − θ_normals − θ_bounds.
   if (b.cos_normals > -1.0f) {
     float c = dot(to, b.axis) * inverse;
     if (b.two_sided) c = std::abs(c);
     if (c < b.cos_normals) {
-      const float s = safe_sqrt(1.0f - c * c), sin_normals = safe_sqrt(1.0f - b.cos_normals * b.cos_normals);
-      c = c * b.cos_normals + s * sin_normals;
+      c = c * b.cos_normals + safe_sqrt(1.0f - c * c) * b.sin_normals;
       if (c < cos_bounds) {
         c = c * cos_bounds + safe_sqrt(1.0f - c * c) * sin_bounds;
         if (c < b.cos_emission - 1e-4f) return 0.0f;
@@ -125,10 +124,11 @@ LightTree::LightTree(const std::vector<LightBounds>& lights) : slot_of_(lights.s
   nodes_.emplace_back();
   build(items);
   slots_.reserve(items.size()), order_.reserve(items.size());
-  for (const Item& item : items) slots_.push_back(item.bounds), order_.push_back(item.light);
+  for (const Item& item : items) slots_.emplace_back(item.bounds), order_.push_back(item.light);
 }
 
 void LightTree::build(std::vector<Item>& items) {
+  std::vector<LightBounds> bounds(1);  // of the nodes
   struct Task {
     uint32_t node, begin, end;
   };
@@ -140,13 +140,13 @@ void LightTree::build(std::vector<Item>& items) {
       nodes_[node].first = begin, nodes_[node].count = end - begin;
       for (uint32_t i = begin; i < end; ++i) {
         slot_of_[items[i].light] = i, leaf_of_[items[i].light] = node;
-        nodes_[node].bounds = merge(nodes_[node].bounds, items[i].bounds);
+        bounds[node] = merge(bounds[node], items[i].bounds);
       }
       continue;
     }
     const uint32_t middle = split({items.data() + begin, end - begin}) + begin, child = uint32_t(nodes_.size());
     nodes_[node].first = child;
-    nodes_.emplace_back(), nodes_.emplace_back();
+    nodes_.resize(nodes_.size() + 2), bounds.resize(nodes_.size());
     nodes_[child].parent = nodes_[child + 1].parent = node;
     tasks.push_back({child, begin, middle});
     tasks.push_back({child + 1, middle, end});
@@ -154,7 +154,8 @@ void LightTree::build(std::vector<Item>& items) {
   // Children come after their parents.
   for (size_t i = nodes_.size(); i-- > 0;) {
     Node& n = nodes_[i];
-    if (n.count == 0) n.bounds = merge(nodes_[n.first].bounds, nodes_[n.first + 1].bounds);
+    if (n.count == 0) bounds[i] = merge(bounds[n.first], bounds[n.first + 1]);
+    n.cluster = LightCluster(bounds[i]);
   }
 }
 
@@ -203,7 +204,7 @@ std::optional<LightTree::Pick> LightTree::sample(const LightQuery& query, float 
   const Node* node = &nodes_[0];
   while (node->count == 0) {
     const Node* child = &nodes_[node->first];
-    const float left = light_importance(child[0].bounds, query), right = light_importance(child[1].bounds, query);
+    const float left = light_importance(child[0].cluster, query), right = light_importance(child[1].cluster, query);
     if (!(left + right > 0.0f)) return std::nullopt;
     const float p = left / (left + right);
     const bool go_left = u < p;
@@ -235,7 +236,7 @@ float LightTree::probability(const LightQuery& query, uint32_t light) const {
   float p = light_importance(slots_[slot_of_[light]], query) / sum;
   while (index != 0 && p > 0.0f) {
     const uint32_t sibling = index & 1u ? index + 1 : index - 1;
-    const float mine = light_importance(nodes_[index].bounds, query), other = light_importance(nodes_[sibling].bounds, query);
+    const float mine = light_importance(nodes_[index].cluster, query), other = light_importance(nodes_[sibling].cluster, query);
     if (!(mine > 0.0f)) return 0.0f;
     p *= mine / (mine + other);
     index = nodes_[index].parent;

@@ -28,8 +28,6 @@ struct LightSet::Impl {
   const Scene& scene;
   std::vector<Lamp> lamps;
   std::vector<TriangleLight> triangles;
-  std::vector<Rgb> constant_emission;        // by material: what it emits, where that is the same everywhere
-  std::vector<uint8_t> emission_is_constant;
   std::vector<std::vector<uint32_t>> triangle_light;  // by instance: light of each triangle, kNoId for none; empty: no light
   WorldLight world;
   LampBvh bvh;
@@ -89,12 +87,10 @@ struct LightSet::Impl {
   }
 
   void add_triangles(int threads, std::vector<LightBounds>& bounds) {
-    TrianglePowers powers = measure_triangles(scene, threads);
-    constant_emission = std::move(powers.constant_emission);
-    emission_is_constant = std::move(powers.is_constant);
+    const std::vector<MeasuredTriangle> found = measure_triangles(scene, threads);
     triangle_light.resize(scene.instances().size());
-    triangles.reserve(powers.lights.size());
-    for (const MeasuredTriangle& m : powers.lights) {
+    triangles.reserve(found.size());
+    for (const MeasuredTriangle& m : found) {
       auto& table = triangle_light[m.light.instance];
       if (table.empty()) table.assign(scene.mesh(scene.instances()[m.light.instance].mesh).triangle_count(), kNoId);
       const uint32_t index = first_triangle() + uint32_t(triangles.size());
@@ -225,8 +221,8 @@ struct LightSet::Impl {
     if (!t || !(t->pdf_dir > 0.0f)) return std::nullopt;
     LightSample s;
     s.wi = t->wi, s.distance = t->distance, s.pdf_dir = t->pdf_dir, s.light = light;
-    if (emission_is_constant[triangle.material]) {
-      s.radiance = constant_emission[triangle.material];
+    if (const auto& constant = scene.material(int(triangle.material)).program.constant_emission()) {
+      s.radiance = *constant;
     } else {
       ShadingPoint p =
           scene.surface_point(triangle.instance, triangle.triangle, t->b1, t->b2, -t->wi, seen_by_light(query.path, t->distance));
@@ -268,7 +264,8 @@ struct LightSet::Impl {
 };
 
 LightSet::LightSet(const Scene& scene, int threads)
-    : impl_(std::make_unique<const Impl>(scene, threads > 0 ? threads : int(std::max(1u, std::thread::hardware_concurrency())))) {}
+    : impl_(std::make_unique<const Impl>(scene, threads > 0 ? threads : int(std::max(1u, std::thread::hardware_concurrency())))),
+      has_findable_lamps_(!impl_->bvh.empty()) {}
 LightSet::~LightSet() = default;
 
 uint32_t LightSet::count() const { return impl_->count(); }
@@ -331,7 +328,7 @@ LightEval LightSet::eval_sun(uint32_t sun, const LightQuery& from, Vec3 directio
           shape.pdf_dir() * impl_->pick_probability(from, index)};
 }
 
-float LightSet::pdf_triangle(const LightQuery& from, const ShadingPoint& point, float) const {
+float LightSet::pdf_triangle(const LightQuery& from, const ShadingPoint& point) const {
   if (point.instance >= impl_->triangle_light.size()) return 0.0f;
   const auto& table = impl_->triangle_light[point.instance];
   if (table.empty() || table[point.triangle] == kNoId) return 0.0f;

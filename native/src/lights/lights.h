@@ -54,14 +54,15 @@ class LightSet {
 
   // Lamps are transparent: the nearest lamp with a shape that a ray of `visibility` meets in (t_min, t_max), or the next
   // one behind `after`. Lamps without multiple importance sampling are found by camera rays alone.
+  bool has_findable_lamps() const { return has_findable_lamps_; }
   std::optional<LampHit> intersect_lamp(const Ray& ray, uint32_t visibility, const LampHit* after = nullptr) const;
   // `from` is where the ray left a surface; for its density alone.
   LightEval eval_lamp(const LightQuery& from, const Ray& ray, const LampHit& hit) const;
   // Suns of a visible size, seen along a ray that leaves the scene: one call per sun.
   uint32_t sun_count() const;
   LightEval eval_sun(uint32_t sun, const LightQuery& from, Vec3 direction, uint32_t visibility) const;
-  // Density with which `sample` picks the point that a ray of length `t` hit on an emissive triangle.
-  float pdf_triangle(const LightQuery& from, const ShadingPoint& point, float t) const;
+  // Density with which `sample` picks the direction towards the point of an emissive triangle that a ray hit.
+  float pdf_triangle(const LightQuery& from, const ShadingPoint& point) const;
   // Density with which `sample` picks `direction` on the world.
   float pdf_world(const LightQuery& from, Vec3 direction) const;
   // Probability with which `sample` picks the light.
@@ -71,6 +72,7 @@ class LightSet {
  private:
   struct Impl;
   std::unique_ptr<const Impl> impl_;
+  bool has_findable_lamps_ = false;
 };
 
 }  // namespace gi

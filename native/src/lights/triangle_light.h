@@ -19,20 +19,25 @@ struct TriangleLight {
 
   Vec3 normal() const { return normalize(cross(ab, ac)); }
   float area() const { return 0.5f * length(cross(ab, ac)); }
-  bool shines_to(Vec3 position) const { return dot(position - a, cross(ab, ac)) > 0.0f ? front : back; }
 
   std::optional<TriangleSample> sample(Vec3 position, Vec2 u) const {
-    if (!shines_to(position)) return std::nullopt;
-    const Corners c(*this, position);
-    return c.by_angle ? sample_by_angle(c, position, u) : sample_by_area(position, u);
+    const Vec3 n = cross(ab, ac);
+    if (!shines_to(position, n)) return std::nullopt;
+    if (is_near(position, n)) {
+      const Corners c(*this, position);
+      if (c.by_angle) return sample_by_angle(c, position, u);
+    }
+    return sample_by_area(position, n, u);
   }
 
   // Density of `sample` at the point in direction `wi`, which is on the triangle.
   float pdf_dir(Vec3 position, Vec3 wi) const {
-    if (!shines_to(position)) return 0.0f;
-    const Corners c(*this, position);
-    if (c.by_angle) return 1.0f / c.solid_angle;
     const Vec3 n = cross(ab, ac);
+    if (!shines_to(position, n)) return 0.0f;
+    if (is_near(position, n)) {
+      const Corners c(*this, position);
+      if (c.by_angle) return 1.0f / c.solid_angle;
+    }
     const float twice_area = length(n), across = dot(wi, n);
     if (across == 0.0f) return 0.0f;
     const float distance = std::abs(dot(a - position, n) / across);
@@ -43,6 +48,14 @@ struct TriangleLight {
   // Where area sampling's 1/cos and 1/d² do not matter the cheaper way is taken; near a whole half space the angles
   // lose their digits. Bounds as in pbrt-v4.
   static constexpr float kMinSolidAngle = 3e-4f, kMaxSolidAngle = 6.22f;
+  static constexpr float kFar = 8.0f;  // in edges
+
+  // Whether it fills so much of the view that 1/cos and 1/d² change across it.
+  bool is_near(Vec3 position, Vec3 n) const {
+    const Vec3 to = a - position;
+    const float edge2 = std::max({length_squared(ab), length_squared(ac), length_squared(ac - ab)});
+    return sqr(dot(to, n)) < edge2 * length_squared(n) && length_squared(to) < sqr(kFar) * edge2;
+  }
 
   struct Corners {
     Vec3 a, b, c;
@@ -56,9 +69,11 @@ struct TriangleLight {
     }
   };
 
-  std::optional<TriangleSample> sample_by_area(Vec3 position, Vec2 u) const {
+  bool shines_to(Vec3 position, Vec3 n) const { return dot(position - a, n) > 0.0f ? front : back; }
+
+  std::optional<TriangleSample> sample_by_area(Vec3 position, Vec3 n, Vec2 u) const {
     const Vec2 b = sample_triangle(u);
-    const Vec3 to = a + ab * b.x + ac * b.y - position, n = cross(ab, ac);
+    const Vec3 to = a + ab * b.x + ac * b.y - position;
     const float distance = length(to), twice_area = length(n);
     if (!(distance > 0.0f)) return std::nullopt;
     const Vec3 wi = to / distance;

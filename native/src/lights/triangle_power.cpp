@@ -24,19 +24,6 @@ float magnitude(Rgb c) {
 
 bool shines(const MaterialData& m) { return m.emission_sampling != EmissionSampling::kNone && m.program.has_emission(); }
 
-void measure_constants(const Scene& scene, TrianglePowers& out) {
-  const auto& materials = scene.data().materials;
-  out.constant_emission.resize(materials.size());
-  out.is_constant.assign(materials.size(), 0);
-  for (size_t i = 0; i < materials.size(); ++i) {
-    if (!shines(materials[i]) || !materials[i].program.emission_program().is_constant()) continue;
-    ShadingPoint nowhere;
-    nowhere.wo = nowhere.ng = nowhere.ns = {0, 0, 1};
-    out.constant_emission[i] = scene.run_emission(int(i), nowhere);
-    out.is_constant[i] = 1;
-  }
-}
-
 std::vector<Candidate> candidates(const Scene& scene) {
   std::vector<Candidate> all;
   for (uint32_t i = 0; i < scene.instances().size(); ++i) {
@@ -75,7 +62,7 @@ float side_radiance(const Scene& scene, Candidate c, Vec3 wo, int points, bool& 
   return sum / float(points);
 }
 
-MeasuredTriangle measure(const Scene& scene, Candidate c, const TrianglePowers& constants, int points) {
+MeasuredTriangle measure(const Scene& scene, Candidate c, int points) {
   MeasuredTriangle m;
   Vec3 v[3];
   scene.triangle_vertices(c.instance, c.triangle, v);
@@ -86,7 +73,7 @@ MeasuredTriangle measure(const Scene& scene, Candidate c, const TrianglePowers& 
   if (!(m.light.area() > 0.0f) || !std::isfinite(m.light.area())) return m;
 
   const EmissionSampling mode = scene.material(int(m.light.material)).emission_sampling;
-  const bool constant = constants.is_constant[m.light.material];
+  const bool constant = scene.material(int(m.light.material)).program.constant_emission().has_value();
   float side[2];
   for (int k = 0; k < 2; ++k) {
     bool backfacing = k == 1;
@@ -102,11 +89,10 @@ MeasuredTriangle measure(const Scene& scene, Candidate c, const TrianglePowers& 
 
 }  // namespace
 
-TrianglePowers measure_triangles(const Scene& scene, int threads) {
-  TrianglePowers out;
-  measure_constants(scene, out);
+std::vector<MeasuredTriangle> measure_triangles(const Scene& scene, int threads) {
+  std::vector<MeasuredTriangle> lights;
   const std::vector<Candidate> all = candidates(scene);
-  if (all.empty()) return out;
+  if (all.empty()) return lights;
   const int points = int(std::clamp<size_t>(kPointBudget / (2 * all.size()), kLeastPoints, kMostPoints));
   std::vector<MeasuredTriangle> measured(all.size());
   constexpr size_t kBlock = 1024;
@@ -114,12 +100,12 @@ TrianglePowers measure_triangles(const Scene& scene, int threads) {
   const std::atomic<bool> go_on{false};
   pool.for_each(int((all.size() + kBlock - 1) / kBlock), go_on, [&](int block) {
     const size_t end = std::min(all.size(), (size_t(block) + 1) * kBlock);
-    for (size_t i = size_t(block) * kBlock; i < end; ++i) measured[i] = measure(scene, all[i], out, points);
+    for (size_t i = size_t(block) * kBlock; i < end; ++i) measured[i] = measure(scene, all[i], points);
   });
   for (const MeasuredTriangle& m : measured) {
-    if (m.radiance > 0.0f) out.lights.push_back(m);
+    if (m.radiance > 0.0f) lights.push_back(m);
   }
-  return out;
+  return lights;
 }
 
 }  // namespace gi

@@ -11,12 +11,6 @@ struct MeasuredTriangle {
   float radiance = 0;  // |luminance| of the stronger side, on average
 };
 
-struct TrianglePowers {
-  std::vector<MeasuredTriangle> lights;
-  std::vector<Rgb> constant_emission;  // by material
-  std::vector<uint8_t> is_constant;    // the material emits the same everywhere
-};
-
-TrianglePowers measure_triangles(const Scene& scene, int threads);
+std::vector<MeasuredTriangle> measure_triangles(const Scene& scene, int threads);
 
 }  // namespace gi

@@ -78,7 +78,7 @@ WorldLight::WorldLight(const Scene& scene, int threads) {
   if (world.program < 0 || !world.sampled) return;
   const Program& program = scene.material(world.program).program;
   if (!program.has_emission()) return;
-  if (program.emission_program().is_constant()) {
+  if (program.constant_emission()) {
     mean_ = strength(scene, 0.5f, 0.5f);
     return;
   }
@@ -143,6 +143,8 @@ void WorldLight::refine(const Scene& scene, std::vector<float>& density, int wid
     if (near[i]) hot.push_back(i);
   fine_of_.assign(density.size(), -1);
   fine_.resize(hot.size());
+  row_is_fine_.assign(size_t(height), 0);
+  for (const size_t texel : hot) row_is_fine_[texel / size_t(width)] = 1;
   const std::atomic<bool> go_on{false};
   pool.for_each(int(hot.size()), go_on, [&](int k) {
     const size_t texel = hot[size_t(k)];

@@ -27,6 +27,12 @@ void reflection(const Operands& o, ShadeState& s) {
   o.set(0, p.instance == kNoId ? p.wo : reflect(p.wo, p.ns));
 }
 
+// Width of a pixel along the surface's first direction, as it is seen.
+float pixel_across(const ShadingPoint& p) {
+  const Vec3 dx = Frame::from_normal(p.ng).x * (2.0f * p.footprint);
+  return length(dx - p.wo * dot(dx, p.wo));
+}
+
 // size; in pixels
 void wireframe(const Operands& o, ShadeState& s) {
   const ShadingPoint& p = s.point;
@@ -35,7 +41,7 @@ void wireframe(const Operands& o, ShadeState& s) {
   Vec3 v[3];
   s.resources.scene->triangle_vertices(p.instance, p.triangle, v);
   // A wire is split between the two faces of its edge.
-  const float width = 0.5f * o.f(1) * (o.imm(2) ? 2.0f * length(p.dpdx - p.wo * dot(p.dpdx, p.wo)) : 1.0f);
+  const float width = 0.5f * o.f(1) * (o.imm(2) ? pixel_across(p) : 1.0f);
   for (int i = 0; i < 3; ++i) {
     const Vec3 edge = v[(i + 1) % 3] - v[i];
     if (length_squared(cross(edge, p.position - v[i])) < length_squared(edge) * sqr(width)) o.set(0, 1.0f);

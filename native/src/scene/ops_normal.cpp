@@ -51,11 +51,10 @@ struct Steps {
   Vec3 dx, dy;  // one pixel over the surface
 };
 Steps pixel_steps(const ShadeState& s) {
-  const ShadingPoint& p = s.point;
-  if (!(p.dpdx == Vec3{})) return {p.dpdx * 2.0f, p.dpdy * 2.0f};  // the footprint is a radius
-  const Frame frame = Frame::from_normal(p.ng);
-  const float step = s.resources.scene && !s.resources.scene->bounds().empty() ? kDefaultStep * length(s.resources.scene->bounds().extent())
-                                                                               : kDefaultStep;
+  const Scene* scene = s.resources.scene;
+  float step = 2.0f * s.point.footprint;  // the footprint is a radius
+  if (!(step > 0.0f)) step = kDefaultStep * (scene && !scene->bounds().empty() ? length(scene->bounds().extent()) : 1.0f);
+  const Frame frame = Frame::from_normal(s.point.ng);
   return {frame.x * step, frame.y * step};
 }
 

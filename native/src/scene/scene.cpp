@@ -10,14 +10,6 @@ namespace {
 // occlusion query settles all that is opaque.
 constexpr uint32_t kTransparentShadowBit = 1u << 16;
 
-// Object space; for meshes that have normals.
-Vec3 corner_normal(const MeshData& mesh, uint32_t triangle, int k) {
-  const int32_t corner = mesh.tri_corner[3 * size_t(triangle) + size_t(k)];
-  const int32_t at = mesh.normals_domain == Domain::kPoint ? mesh.corner_vert[size_t(corner)] : corner;
-  const float* q = mesh.normals.data + 3 * size_t(at);
-  return {q[0], q[1], q[2]};
-}
-
 // Turns and scales alike in all directions.
 bool keeps_angles(const Affine& a) {
   const Vec3 x = a.column(0), y = a.column(1), z = a.column(2);
@@ -31,6 +23,7 @@ bool keeps_angles(const Affine& a) {
 Scene::Scene(SceneData data, std::unique_ptr<ShaderResources> resources, const std::string& embree, int threads)
     : data_(std::move(data)), resources_(std::move(resources)) {
   resources_->scene = this;
+  index_vertices();
   resolve_attributes();
   make_tangents();  // in object space, so before meshes are placed
   place_meshes();
@@ -40,6 +33,13 @@ Scene::Scene(SceneData data, std::unique_ptr<ShaderResources> resources, const s
 Scene::~Scene() = default;
 
 // ---------------------------------------------------------------- building
+
+void Scene::index_vertices() {
+  for (const MeshData& mesh : data_.meshes) {
+    std::vector<uint32_t>& indices = indices_.emplace_back(mesh.tri_corner.size);
+    for (size_t k = 0; k < indices.size(); ++k) indices[k] = uint32_t(mesh.corner_vert[size_t(mesh.tri_corner[k])]);
+  }
+}
 
 void Scene::place_meshes() {
   std::vector<uint32_t> uses(data_.meshes.size(), 0);
@@ -114,30 +114,27 @@ std::vector<CornerTangent> Scene::tangents_of(uint32_t m, int slot) const {
   std::vector<TangentCorner> corners(mesh.tri_corner.size);
   ShadingPoint point;
   for (size_t c = 0; c < corners.size(); ++c) {
-    const float* p = mesh.positions.data + 3 * size_t(mesh.corner_vert[size_t(mesh.tri_corner[c])]);
+    const float* p = mesh.positions.data + 3 * size_t(indices_[m][c]);
     corners[c].position = {p[0], p[1], p[2]};
     corners[c].uv = spherical_uv(corners[c].position);
     if (index < 0) continue;
     float uv[4];
     point.triangle = uint32_t(c / 3), point.b1 = c % 3 == 1, point.b2 = c % 3 == 2;
-    interpolate(mesh, mesh.attributes[size_t(index)], point, uv);
+    interpolate(m, mesh.attributes[size_t(index)], point, uv);
     corners[c].uv = {uv[0], uv[1]};
   }
   for (size_t c = 0; c < corners.size(); c += 3) {
     const Vec3 a = corners[c].position, flat = normalize(cross(corners[c + 1].position - a, corners[c + 2].position - a));
     for (size_t k = 0; k < 3; ++k)
-      corners[c + k].normal = mesh.normals_domain == Domain::kFace ? flat : corner_normal(mesh, uint32_t(c / 3), int(k));
+      corners[c + k].normal = mesh.normals_domain == Domain::kFace ? flat : corner_normal(m, uint32_t(c / 3), int(k));
   }
   return corner_tangents(corners);
 }
 
 void Scene::build_accel(const std::string& embree, int threads) {
-  indices_.resize(data_.meshes.size());
   std::vector<AccelMesh> meshes;
   for (size_t m = 0; m < data_.meshes.size(); ++m) {
     const MeshData& mesh = data_.meshes[m];
-    indices_[m].resize(mesh.tri_corner.size);
-    for (size_t k = 0; k < mesh.tri_corner.size; ++k) indices_[m][k] = uint32_t(mesh.corner_vert[size_t(mesh.tri_corner[k])]);
     meshes.push_back({mesh.positions.data, mesh.vertex_count(), indices_[m].data(), mesh.triangle_count()});
   }
   std::vector<AccelInstance> placed;
@@ -179,6 +176,14 @@ void Scene::triangle_vertices(uint32_t instance, uint32_t triangle, Vec3 out[3])
   for (int k = 0; k < 3; ++k) out[k] = vertex(placed, v[k]);
 }
 
+// Object space; for meshes that have normals.
+Vec3 Scene::corner_normal(uint32_t m, uint32_t triangle, int k) const {
+  const MeshData& mesh = data_.meshes[m];
+  const size_t at = 3 * size_t(triangle) + size_t(k);
+  const float* q = mesh.normals.data + 3 * size_t(mesh.normals_domain == Domain::kPoint ? indices_[m][at] : uint32_t(mesh.tri_corner[at]));
+  return {q[0], q[1], q[2]};
+}
+
 int Scene::material_of(uint32_t instance, uint32_t triangle) const {
   const Instance& placed = instances_[instance];
   const MeshData& mesh = data_.meshes[placed.mesh];
@@ -201,7 +206,7 @@ ShadingPoint Scene::surface_point(uint32_t instance, uint32_t triangle, float b1
   p.object_position = placed.to_object.point(p.position);
   p.wo = wo;
   p.instance = instance, p.mesh = placed.mesh, p.triangle = triangle;
-  p.b1 = b1, p.b2 = b2;
+  p.b1 = b1, p.b2 = b2, p.footprint = footprint;
   p.path = path;
 
   // Normals turn as the object does, so a mirrored one keeps its outside.
@@ -213,28 +218,13 @@ ShadingPoint Scene::surface_point(uint32_t instance, uint32_t triangle, float b1
     Vec3 sum;
     const auto to_world = [&](Vec3 v) { return placed.to_object.transposed_vector(v); };
     for (int k = 0; k < 3; ++k) {
-      const Vec3 corner = corner_normal(mesh, triangle, k);
+      const Vec3 corner = corner_normal(placed.mesh, triangle, k);
       sum += w[k] * (placed.world_normals ? normalize(to_world(corner)) : corner);
     }
     p.ns = normalize_or(placed.world_normals ? sum : to_world(sum), p.ng);
   }
   p.backfacing = dot(p.ng, wo) < 0.0f;
   if (p.backfacing) p.ng = -p.ng, p.ns = -p.ns;
-
-  if (footprint > 0.0f) {
-    const Frame frame = Frame::from_normal(p.ng);
-    p.dpdx = frame.x * footprint, p.dpdy = frame.y * footprint;
-    // Least squares on the triangle's plane turns the steps into barycentric ones.
-    const float a = dot(e1, e1), b = dot(e1, e2), c = dot(e2, e2), det = a * c - b * b;
-    if (det > 0.0f) {
-      const auto solve = [&](Vec3 d, float& db1, float& db2) {
-        const float x = dot(d, e1), y = dot(d, e2);
-        db1 = (c * x - b * y) / det, db2 = (a * y - b * x) / det;
-      };
-      solve(p.dpdx, p.db1_dx, p.db2_dx);
-      solve(p.dpdy, p.db1_dy, p.db2_dy);
-    }
-  }
   return p;
 }
 
@@ -262,7 +252,7 @@ Vec3 Scene::shadow_origin(const ShadingPoint& point, Vec3 wi) const {
   const float b[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
   Vec3 lift;
   for (int k = 0; k < 3; ++k) {
-    n[k] = normalize(placed.to_object.transposed_vector(corner_normal(mesh, point.triangle, k)));
+    n[k] = normalize(placed.to_object.transposed_vector(corner_normal(placed.mesh, point.triangle, k)));
     if (dot(n[k], point.ng) * side < 0.0f) n[k] = -n[k];  // towards the side that light comes from
     lift += b[k] * n[k];
   }
@@ -295,7 +285,7 @@ Rgb Scene::emission(ShadingPoint& point) const { return run_emission(material_of
 
 Rgb Scene::run_emission(int program, ShadingPoint& point) const {
   const Program& p = material(program).program;
-  if (!p.has_emission()) return Rgb();
+  if (const auto& constant = p.constant_emission()) return *constant;
   Bsdf bsdf;
   bsdf.clear(point.ng, point.ns);
   p.emission_program().run(point, *resources_, &bsdf);
@@ -367,7 +357,7 @@ int Scene::attribute(const ShadingPoint& point, int slot, float out[4]) const {
   }
   const MeshData& mesh = data_.meshes[placed.mesh];
   const AttributeData& found = mesh.attributes[size_t(index)];
-  interpolate(mesh, found, point, out);
+  interpolate(placed.mesh, found, point, out);
   return found.components;
 }
 
@@ -375,21 +365,22 @@ bool Scene::active_uv(const ShadingPoint& point, float out[4]) const {
   out[0] = out[1] = out[2] = 0.0f, out[3] = 1.0f;
   const int index = point.mesh == kNoId ? -1 : active_uv_[point.mesh];
   if (index < 0) return false;
-  interpolate(data_.meshes[point.mesh], data_.meshes[point.mesh].attributes[size_t(index)], point, out);
+  interpolate(point.mesh, data_.meshes[point.mesh].attributes[size_t(index)], point, out);
   return true;
 }
 
-void Scene::interpolate(const MeshData& mesh, const AttributeData& a, const ShadingPoint& point, float out[4]) const {
+void Scene::interpolate(uint32_t m, const AttributeData& a, const ShadingPoint& point, float out[4]) const {
+  const MeshData& mesh = data_.meshes[m];
   const size_t n = size_t(a.components);
   if (a.domain == Domain::kFace) {
     std::copy_n(a.data.data + size_t(mesh.tri_face[point.triangle]) * n, n, out);
     return;
   }
-  const int32_t* corner = mesh.tri_corner.data + 3 * size_t(point.triangle);
+  const size_t first = 3 * size_t(point.triangle);
   const float w[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
   float sum[4] = {0, 0, 0, 0};
-  for (int k = 0; k < 3; ++k) {
-    const size_t at = size_t(a.domain == Domain::kPoint ? mesh.corner_vert[size_t(corner[k])] : corner[k]);
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t at = a.domain == Domain::kPoint ? indices_[m][first + k] : size_t(mesh.tri_corner[first + k]);
     for (size_t c = 0; c < n; ++c) sum[c] += w[k] * a.data[at * n + c];
   }
   std::copy_n(sum, n, out);
@@ -402,7 +393,7 @@ Vec3 Scene::smooth_object_normal(const ShadingPoint& point) const {
   if (mesh.normals_domain == Domain::kFace) return flat;
   const float w[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
   Vec3 sum;
-  for (int k = 0; k < 3; ++k) sum += w[k] * corner_normal(mesh, point.triangle, k);
+  for (int k = 0; k < 3; ++k) sum += w[k] * corner_normal(placed.mesh, point.triangle, k);
   return sum == Vec3{} ? flat : sum;
 }
 

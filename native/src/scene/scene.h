@@ -89,13 +89,15 @@ class Scene {
   static constexpr size_t kRayCounters = 64;
   void count_ray() const;
 
+  void index_vertices();
   void place_meshes();
   void resolve_attributes();
   void make_tangents();
   std::vector<CornerTangent> tangents_of(uint32_t mesh, int slot) const;
   void build_accel(const std::string& embree, int threads);
   Vec3 vertex(const Instance& instance, uint32_t v) const;
-  void interpolate(const MeshData& mesh, const AttributeData& attribute, const ShadingPoint& point, float out[4]) const;
+  Vec3 corner_normal(uint32_t mesh, uint32_t triangle, int k) const;
+  void interpolate(uint32_t mesh, const AttributeData& attribute, const ShadingPoint& point, float out[4]) const;
 
   SceneData data_;
   std::vector<Instance> instances_;

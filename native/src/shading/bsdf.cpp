@@ -2,8 +2,6 @@
 // (shading_normal.h) is applied here, once, for every lobe.
 #include "shading/bsdf.h"
 
-#include <memory>
-
 #include "shading/shading_normal.h"
 #include "shading/shading_point.h"
 
@@ -35,13 +33,6 @@ uint8_t sides_without(uint8_t flags, uint8_t without) {
   if (flags & kDiffuse) return 0;
   return flags & ((without & kNoReflectiveCaustics ? kReflection : 0) | (without & kNoRefractiveCaustics ? kTransmission : 0));
 }
-void remove_side(Lobe& lobe, uint8_t side) {
-  std::visit(
-      [side](auto& l) {
-        if constexpr (requires { l.remove(side); }) l.remove(side);
-      },
-      lobe);
-}
 
 void blur_lobe(Lobe& lobe, float alpha) {
   std::visit(
@@ -53,14 +44,15 @@ void blur_lobe(Lobe& lobe, float alpha) {
 
 }  // namespace
 
-void Bsdf::add(Rgb weight, const Lobe& lobe, const Frame& frame) {
+Bsdf::Entry* Bsdf::new_entry(Rgb weight, uint8_t flags, const Frame& frame) {
   const Rgb w{std::max(weight.r, 0.0f), std::max(weight.g, 0.0f), std::max(weight.b, 0.0f)};
-  if (!(average(w) >= kLeastWeight) || !is_finite(w) || count_ == kMaxLobes) return;
-  const uint8_t flags = flags_of(lobe), removed = sides_without(flags, without_), left = flags & ~removed;
-  if (!(left & (kReflection | kTransmission))) return;
-  Entry& e = *std::construct_at(&entries_[count_++], Entry{lobe, frame, w, 0.0f, left, !(frame.z == ns_)});
-  if (removed) remove_side(e.lobe, removed);
+  if (!(average(w) >= kLeastWeight) || !is_finite(w) || count_ == kMaxLobes) return nullptr;
+  const uint8_t left = flags & ~sides_without(flags, without_);
+  if (!(left & (kReflection | kTransmission))) return nullptr;
+  Entry& e = entries_[count_++];
+  e.frame = frame, e.weight = w, e.select = 0.0f, e.flags = left, e.bumped = !(frame.z == ns_);
   flags_ |= left;
+  return &e;
 }
 
 void Bsdf::finish(Vec3 wo) {
@@ -167,7 +159,8 @@ std::optional<BsdfSample> Bsdf::sample_delta(Vec3 wo, float u_lobe) const {
 }
 
 std::optional<BsdfSample> Bsdf::sample_entry(const Entry& e, Vec3 wo, Vec2 u, float u_lobe) const {
-  const auto s = sample_of(e.lobe, e.frame.to_local(wo), u, u_lobe);
+  const Lambert* lambert = std::get_if<Lambert>(&e.lobe);  // the commonest needs no view
+  const auto s = lambert ? lambert->sample({}, u, u_lobe) : sample_of(e.lobe, e.frame.to_local(wo), u, u_lobe);
   if (!s || !(s->pdf_dir > 0.0f)) return {};
   const Vec3 wi = e.frame.to_world(s->wi);
   const bool transmitted = s->flags & kTransmission;

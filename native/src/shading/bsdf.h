@@ -1,6 +1,7 @@
 // The scattering of one shading point: a weighted mix of lobes, what it emits and what it lets through.
 // Integrators see only this; lobes live one to a header under lobes/ and know only their own local frame.
 #pragma once
+#include <memory>
 #include <optional>
 #include <type_traits>
 
@@ -40,7 +41,15 @@ class Bsdf {
 
   // Adds `lobe` in the frame whose z is the lobe's own (bumped) normal. Negative components count as 0; weights that come to
   // nothing are dropped, and so are lobes beyond kMaxLobes.
-  void add(Rgb weight, const Lobe& lobe, const Frame& frame);
+  template <class L>
+  void add(Rgb weight, const L& lobe, const Frame& frame) {
+    if (Entry* e = new_entry(weight, lobe.flags(), frame)) {
+      std::construct_at(&e->lobe, std::in_place_type<L>, lobe);
+      if constexpr (requires(L l) { l.remove(uint8_t(0)); }) {
+        if (e->flags != lobe.flags()) std::get<L>(e->lobe).remove(lobe.flags() & ~e->flags);
+      }
+    }
+  }
   // Called once after the last add: selection probabilities from the lobes' albedos towards `wo`.
   void finish(Vec3 wo);
 
@@ -81,6 +90,7 @@ class Bsdf {
     bool bumped = false;  // its normal is not ns_
   };
   static_assert(std::is_trivially_copyable_v<Entry>);
+  Entry* new_entry(Rgb weight, uint8_t flags, const Frame& frame);  // all but its lobe; null if it comes to nothing
   const Entry* begin() const { return entries_; }
   const Entry* end() const { return entries_ + count_; }
   float shadowing(const Entry& e, Vec3 wi, float cos_i, bool sampled) const;

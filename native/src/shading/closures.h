@@ -6,8 +6,13 @@
 namespace gi {
 
 // Adds a lobe about normal `n`, with `tangent` as the frame's x axis unless it is zero.
-inline void add_lobe(ShadeState& s, Rgb weight, const Lobe& lobe, Vec3 n, Vec3 tangent = {0, 0, 0}) {
+template <class L>
+void add_lobe(ShadeState& s, Rgb weight, const L& lobe, Vec3 n, Vec3 tangent) {
   s.bsdf->add(weight, lobe, Frame::from_normal_and_tangent(n, tangent));
+}
+template <class L>
+void add_lobe(ShadeState& s, Rgb weight, const L& lobe, Vec3 n) {
+  s.bsdf->add(weight, lobe, Frame::from_normal(n));
 }
 
 // Lambert, or Oren-Nayar where it is rough. `color` is the albedo whose multiple scattering is kept.

@@ -8,7 +8,7 @@
 namespace gi {
 namespace {
 
-struct Rgba {
+struct alignas(16) Rgba {
   float v[4] = {0, 0, 0, 0};
 };
 Rgba operator*(float s, Rgba a) {
@@ -21,37 +21,35 @@ Rgba& operator+=(Rgba& a, Rgba b) {
 }
 
 // Decoding by a table fine enough that linear interpolation in it errs by less than 1e-6.
+constexpr int kDecodeSteps = 2048;
+const auto kDecoded = [] {
+  std::array<float, kDecodeSteps + 2> t;
+  for (int i = 0; i < kDecodeSteps + 2; ++i) {
+    const double e = double(i) / kDecodeSteps;
+    t[size_t(i)] = float(e <= 0.04045 ? e / 12.92 : std::pow((e + 0.055) / 1.055, 2.4));
+  }
+  return t;
+}();
 float srgb_to_linear(float x) {
-  constexpr int kSize = 2048;
-  static const auto table = [] {
-    std::array<float, kSize + 2> t;
-    for (int i = 0; i < kSize + 2; ++i) {
-      const double e = double(i) / kSize;
-      t[size_t(i)] = float(e <= 0.04045 ? e / 12.92 : std::pow((e + 0.055) / 1.055, 2.4));
-    }
-    return t;
-  }();
-  if (x > 1.0f) return std::pow((x + 0.055f) / 1.055f, 2.4f);  // premultiplied colours that exceed their alpha
-  const float position = clamp01(x) * float(kSize);
+  if (x > 1.00001f) return std::pow((x + 0.055f) / 1.055f, 2.4f);  // premultiplied colours that exceed their alpha
+  const float position = clamp01(x) * float(kDecodeSteps);
   const int i = int(position);
-  return lerp(table[size_t(i)], table[size_t(i) + 1], position - float(i));
+  return lerp(kDecoded[size_t(i)], kDecoded[size_t(i) + 1], position - float(i));
 }
 
-// One texel with its colour times alpha; bytes are rounded down, as in Cycles.
-Rgba texel(const ImageTile& t, int x, int y) {
-  const size_t at = 4 * (size_t(y) * size_t(t.width) + size_t(x));
-  const bool straight = t.alpha == AlphaMode::kStraight, opaque = t.alpha == AlphaMode::kNone;
-  Rgba c;
-  if (t.bytes) {
-    const uint8_t* p = t.bytes + at;
-    const bool multiply = straight && p[3] != 255;
-    for (int i = 0; i < 3; ++i) c.v[i] = float(multiply ? p[i] * p[3] / 255 : p[i]) * (1.0f / 255.0f);
-    c.v[3] = opaque ? 1.0f : float(p[3]) * (1.0f / 255.0f);
-  } else {
-    const float* p = t.floats + at;
-    for (int i = 0; i < 3; ++i) c.v[i] = straight ? p[i] * p[3] : p[i];
-    c.v[3] = opaque ? 1.0f : p[3];
-  }
+// One texel in the units of its format, with its colour times alpha; bytes are rounded down, as in Cycles.
+Rgba texel(const uint8_t* p, AlphaMode alpha) {
+  Rgba c{{float(p[0]), float(p[1]), float(p[2]), float(p[3])}};
+  if (alpha == AlphaMode::kNone) c.v[3] = 255.0f;
+  if (alpha == AlphaMode::kStraight && p[3] != 255)
+    for (int i = 0; i < 3; ++i) c.v[i] = float(p[i] * p[3] / 255);
+  return c;
+}
+Rgba texel(const float* p, AlphaMode alpha) {
+  Rgba c{{p[0], p[1], p[2], p[3]}};
+  if (alpha == AlphaMode::kNone) c.v[3] = 1.0f;
+  if (alpha == AlphaMode::kStraight)
+    for (int i = 0; i < 3; ++i) c.v[i] *= p[3];
   return c;
 }
 
@@ -95,20 +93,32 @@ struct Taps {
     int first = int(floor);
     if (interpolation == Interpolation::kLinear) count = 2, weight[0] = 1.0f - t, weight[1] = t;
     if (interpolation == Interpolation::kCubic) count = 4, first -= 1, cubic_weights(t, weight);
-    for (int i = 0; i < count; ++i) index[i] = extend(first + i, n, extension);
+    index[0] = extend(first, n, extension);
+    for (int i = 1; i < count; ++i) {
+      if (extension == Extension::kRepeat)
+        index[i] = index[i - 1] + 1 == n ? 0 : index[i - 1] + 1;
+      else
+        index[i] = extend(first + i, n, extension);
+    }
   }
 };
+
+template <class T>
+Rgba sum_of_texels(const T* pixels, const ImageTile& t, const Taps& column, const Taps& row) {
+  Rgba sum;
+  for (int j = 0; j < row.count; ++j) {
+    if (row.index[j] < 0) continue;
+    const T* line = pixels + 4 * size_t(row.index[j]) * size_t(t.width);
+    for (int i = 0; i < column.count; ++i)
+      if (column.index[i] >= 0) sum += (row.weight[j] * column.weight[i]) * texel(line + 4 * column.index[i], t.alpha);
+  }
+  return sum;
+}
 
 Rgba interpolate(const ImageTile& t, Vec2 uv, Interpolation interpolation, Extension extension) {
   const Taps column(uv.x * float(t.width), t.width, interpolation, extension);
   const Taps row(uv.y * float(t.height), t.height, interpolation, extension);
-  Rgba sum;
-  for (int j = 0; j < row.count; ++j) {
-    if (row.index[j] < 0) continue;
-    for (int i = 0; i < column.count; ++i)
-      if (column.index[i] >= 0) sum += (row.weight[j] * column.weight[i]) * texel(t, column.index[i], row.index[j]);
-  }
-  return sum;
+  return t.bytes ? (1.0f / 255.0f) * sum_of_texels(t.bytes, t, column, row) : sum_of_texels(t.floats, t, column, row);
 }
 
 // The tile under `uv`, which becomes relative to it. Null where there is none.

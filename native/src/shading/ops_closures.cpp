@@ -176,7 +176,7 @@ const Op kOps[] = {
     {"glass", "", "fvffvff", 1, OpKind::kClosure, glass, kAddsLobe},
     {"metallic", "", "fvvfffvvff", 2, OpKind::kClosure, metallic, kAddsLobe},
     {"principled", "", "ffvfffvvffvvffffffffvffvfff", 1, OpKind::kClosure, principled, kAddsLobe},
-    {"principled_emission", "", "ffvfffvvffvvf", 0, OpKind::kClosure, principled_emission, kAddsEmission},
+    {"principled_emission", "", "ffvfffvvffvvf", 0, OpKind::kClosure, principled_emission, kAddsEmission | kSeesPoint},
 };
 
 }  // namespace

@@ -22,6 +22,7 @@ Program::Program(std::string name, std::vector<int32_t> code, std::vector<float>
   summarise();
   if (effects_ & kAddsTransparency) transparency_ = reduced_to(kAddsTransparency);
   if (effects_ & kAddsEmission) emission_ = reduced_to(kAddsEmission);
+  constant_emission_ = find_constant_emission();
   pack_registers();
 }
 
@@ -77,17 +78,15 @@ void Program::run(ShadingPoint& point, const ShaderResources& resources, Bsdf* b
 }
 
 void Program::run_code(float* registers, ShadeState& state) const {
-  const std::span<const Op> table = ops();
   const int32_t* code = code_.data();
-  const size_t size = code_.size();
-  for (size_t at = 0; at < size;) {
-    const int32_t op = code[at];
-    if (op == kJump) {
-      at = registers[code[at + 1]] == 0.0f ? size_t(code[at + 2]) : at + 3;
-      continue;
+  const Step *steps = steps_.data(), *end = steps + steps_.size();
+  for (const Step* step = steps; step < end;) {
+    if (step->run) {
+      step->run(Operands{code + step->operands, registers}, state);
+      ++step;
+    } else {
+      step = registers[code[step->operands]] == 0.0f ? steps + step->target : step + 1;
     }
-    table[size_t(op)].run(Operands{code + at + 1, registers}, state);
-    at += size_t(widths_[size_t(op)]);
   }
 }
 
@@ -175,13 +174,32 @@ void Program::keep(const Wanted& wanted, const std::vector<float>& values, const
 }
 
 void Program::summarise() {
-  effects_ = 0, constant_ = true;
-  for_each_instruction(code_, [&](size_t, const Instruction& i) {
-    effects_ |= i.op.effects;
-    constant_ = constant_ && i.op.kind == OpKind::kClosure;
+  effects_ = 0;
+  for_each_instruction(code_, [&](size_t, const Instruction& i) { effects_ |= i.op.effects; });
+  steps_.clear();
+  std::vector<uint32_t> step_at(code_.size() + 1, 0);
+  for_each_instruction(code_, [&](size_t at, const Instruction& i) {
+    step_at[at] = uint32_t(steps_.size());
+    steps_.push_back({code_[at] == kJump ? nullptr : i.op.run, uint32_t(at + 1)});
   });
-  widths_.clear();
-  for (const Op& op : ops()) widths_.push_back(uint8_t(op.width()));
+  step_at[code_.size()] = uint32_t(steps_.size());
+  for (Step& step : steps_)
+    if (!step.run) step.target = step_at[size_t(code_[step.operands + 1])];
+}
+
+std::optional<Rgb> Program::find_constant_emission() const {
+  if (!emission_) return Rgb();
+  bool constant = true;
+  for_each_instruction(emission_->code_, [&](size_t, const Instruction& i) {
+    constant = constant && i.op.kind == OpKind::kClosure && !(i.op.effects & kSeesPoint);
+  });
+  if (!constant) return std::nullopt;
+  ShadingPoint nowhere;
+  nowhere.wo = nowhere.ng = nowhere.ns = {0, 0, 1};
+  Bsdf bsdf;
+  bsdf.clear(nowhere.ng, nowhere.ns);
+  emission_->run(nowhere, ShaderResources{}, &bsdf);
+  return bsdf.emission;
 }
 
 // Keeps the closures with one of `effects`, what they depend on, and control: read backwards, an instruction is needed if

@@ -6,6 +6,7 @@
 #pragma once
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -56,8 +57,8 @@ enum class OpKind : uint8_t {
   kShift,    // moves the point, and gives what kRestore needs to move it back: kept if something in between is
   kRestore,
 };
-// What a closure op adds, for the programs specialised to one question.
-enum ClosureEffect : uint8_t { kAddsLobe = 1, kAddsEmission = 2, kAddsTransparency = 4 };
+// What a closure op adds, for the programs specialised to one question, and whether it looks at the point to do so.
+enum ClosureEffect : uint8_t { kAddsLobe = 1, kAddsEmission = 2, kAddsTransparency = 4, kSeesPoint = 8 };
 
 struct Op {
   const char* name;
@@ -97,8 +98,8 @@ class Program {
   bool empty() const { return code_.empty(); }
   // Immediate `index` of every call of op `name`: what the program will ask of its surroundings.
   std::vector<int32_t> immediates(std::string_view name, int index) const;
-  // True if what it computes does not depend on the point: no context op is left.
-  bool is_constant() const { return constant_; }
+  // What it emits where that does not depend on the point: no context op decides it.
+  const std::optional<Rgb>& constant_emission() const { return constant_emission_; }
 
  private:
   void check() const;
@@ -108,6 +109,7 @@ class Program {
   void drop_all_but(uint8_t effects);
   void pack_registers();
   void summarise();
+  std::optional<Rgb> find_constant_emission() const;
   void run_code(float* registers, ShadeState& state) const;
   std::shared_ptr<Program> reduced_to(uint8_t effects) const;
 
@@ -116,9 +118,15 @@ class Program {
   std::vector<float> constants_;
   int register_count_ = 0;
   std::vector<float> tables_;
-  std::vector<uint8_t> widths_;  // of every op, for the interpreter
+  // The code once more, as the interpreter wants it.
+  struct Step {
+    OpFunction run;       // null: jump_if_zero
+    uint32_t operands;    // where they begin in the code
+    uint32_t target = 0;  // of a jump, as a step
+  };
+  std::vector<Step> steps_;
   uint8_t effects_ = 0;
-  bool constant_ = true;
+  std::optional<Rgb> constant_emission_;
   std::shared_ptr<Program> transparency_, emission_;
 };
 

@@ -21,7 +21,8 @@ enum CausticFlags : uint8_t { kNoReflectiveCaustics = 1, kNoRefractiveCaustics =
 
 struct PathState {  // of the ray that arrived
   uint32_t kind = kRayCamera;
-  int depth = 0, diffuse_depth = 0, glossy_depth = 0, transmission_depth = 0, transparent_depth = 0, portal_depth = 0;
+  // Small, since the state is copied at every bounce; Blender's limits end at 1024.
+  int16_t depth = 0, diffuse_depth = 0, glossy_depth = 0, transmission_depth = 0, transparent_depth = 0, portal_depth = 0;
   float ray_length = 0;
   uint8_t without = 0;  // CausticFlags: lobes that are left out at the next surface
 };
@@ -36,8 +37,7 @@ struct ShadingPoint {
   Vec3 object_position;  // in the instance's own space
   uint32_t instance = kNoId, mesh = kNoId, triangle = kNoId;  // kNoId on the world and on lamps
   float b1 = 0, b2 = 0;  // barycentrics of the triangle's 2nd and 3rd corner
-  Vec3 dpdx, dpdy;       // footprint of the pixel on the surface, world: what Bump and filtering step by
-  float db1_dx = 0, db2_dx = 0, db1_dy = 0, db2_dy = 0;  // the same in barycentrics
+  float footprint = 0;    // radius of the pixel on the surface, metres: what Bump steps by; 0 where the path has none
   PathState path;
   const Affine* lamp_to_world = nullptr;  // on lamps
   const float* instance_info = nullptr;  // see scene/scene.h InstanceInfo

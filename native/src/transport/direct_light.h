@@ -77,6 +77,7 @@ inline Rgb sample_direct_light(const RenderContext& context, const ShadingPoint&
 inline Rgb lamps_along(const RenderContext& context, Ray ray, float t_surface, const RayOrigin& from, LightSampling mode,
                        uint32_t visibility) {
   Rgb sum;
+  if (!context.lights.has_findable_lamps()) return sum;
   ray.t_max = t_surface;
   auto hit = context.lights.intersect_lamp(ray, visibility);
   while (hit) {
@@ -106,11 +107,11 @@ inline Rgb light_beyond(const RenderContext& context, const Ray& ray, const RayO
 }
 
 // Emission of the surface that a ray met, weighed.
-inline Rgb surface_emission(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, const RayOrigin& from,
-                            LightSampling mode, float t) {
-  if (is_black(bsdf.emission)) return Rgb();
+inline Rgb surface_emission(const RenderContext& context, const ShadingPoint& point, Rgb emission, const RayOrigin& from,
+                            LightSampling mode) {
+  if (is_black(emission)) return Rgb();
   const bool weighed = mode != LightSampling::kOff && std::isfinite(from.pdf_dir);
-  return bsdf.emission * (weighed ? found_weight(mode, from.pdf_dir, context.lights.pdf_triangle(from.query, point, t)) : 1.0f);
+  return emission * (weighed ? found_weight(mode, from.pdf_dir, context.lights.pdf_triangle(from.query, point)) : 1.0f);
 }
 
 }  // namespace gi
