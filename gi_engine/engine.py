@@ -151,7 +151,7 @@ class GIEngine(bpy.types.RenderEngine):
             memory = progress["memory"] / 2**20
             self.update_progress(progress["fraction"])
             self.update_memory_stats(memory_used=memory, memory_peak=memory)
-            self.update_stats("", status(progress, left))
+            self.update_stats("", status(progress, left, self.exported.settings.samples))
         control.report(
             control.Progress(
                 stage="Render",
@@ -198,12 +198,12 @@ def show_interval(elapsed: float) -> float:
     return min(max(SHOW_SECONDS, 0.1 * elapsed), SHOW_SECONDS_LATER)
 
 
-def status(progress: dict, left: float | None) -> str:
+def status(progress: dict, left: float | None, samples: int) -> str:
     """The line over the picture. Blender leaves its own figure of the memory out where there is one."""
     rate = progress["rays"] / progress["seconds"] * 1e-6 if progress["seconds"] > 0 else 0
     parts = [
         f"Mem:{progress['memory'] / 2**20:.0f}M",
-        f"Sample {progress['samples_per_pixel']:.0f}",
+        f"Sample {progress['samples_per_pixel']:.0f}/{samples}",
         f"{rate:.1f} Mrays/s",
     ]
     if left is not None:

@@ -348,6 +348,12 @@ def test_pictures_come_seldom_once_they_change_slowly():
     assert engine.show_interval(3600.0) == 3.0
 
 
+def test_the_line_over_the_picture():
+    progress = {"rays": 3e6, "seconds": 2.0, "samples_per_pixel": 12, "memory": 5 << 20}
+    assert engine.status(progress, 3700.0, 64) == "Remaining 1:01:40 | Mem:5M | Sample 12/64 | 1.5 Mrays/s"
+    assert engine.status(progress, None, 64) == "Mem:5M | Sample 12/64 | 1.5 Mrays/s"
+
+
 def test_rendering_leaves_pythons_other_threads_running(plane, watched):
     ticks = []
     stop = threading.Event()
