@@ -13,6 +13,11 @@ def normal_maps_take_short_normals() -> bool:
     return bpy.app.version < (5, 0, 0)
 
 
+def metal_has_no_film() -> bool:
+    """Up to Blender 4.5 the thin film of the Principled BSDF is on its dielectric part alone."""
+    return bpy.app.version < (5, 0, 0)
+
+
 def straight_floats_are_associated() -> bool:
     """Up to Blender 4.5 Cycles takes the colours of float images for multiplied by alpha, however they are marked."""
     return bpy.app.version < (5, 0, 0)

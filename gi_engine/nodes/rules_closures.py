@@ -166,14 +166,27 @@ def principled(b, weight):
     if not is_zero(b, subsurface) and number(b, thin_wall) in (None, 0.0):
         b.warn("subsurface scattering is not rendered yet; it is diffuse of the same albedo")
     anisotropy = b.input("Anisotropic")
-    b.op(
-        "principled", weight, alpha, base_normal, *top,
-        b.input("Base Color"), b.input("Metallic"), b.input("Roughness"), b.input("IOR"), thin_wall,
-        b.input("Diffuse Roughness"), subsurface, b.input("Subsurface Anisotropy"),
-        b.input("Specular IOR Level"), b.input("Specular Tint"),
-        anisotropy, b.input("Anisotropic Rotation"), tangent(b, anisotropy),
-        b.input("Transmission Weight"), *film(b), imm=(DISTRIBUTIONS[b.node.distribution],),
-    )  # fmt: skip
+    for share, metal, coating in principled_films(b, weight):
+        b.op(
+            "principled", share, alpha, base_normal, *top,
+            b.input("Base Color"), metal, b.input("Roughness"), b.input("IOR"), thin_wall,
+            b.input("Diffuse Roughness"), subsurface, b.input("Subsurface Anisotropy"),
+            b.input("Specular IOR Level"), b.input("Specular Tint"),
+            anisotropy, b.input("Anisotropic Rotation"), tangent(b, anisotropy),
+            b.input("Transmission Weight"), *coating, imm=(DISTRIBUTIONS[b.node.distribution],),
+        )  # fmt: skip
+
+
+def principled_films(b, weight) -> list[tuple]:
+    """(weight, metallic, film) of the parts of the surface: two where metal has no film and the rest has one."""
+    from ..export.version import metal_has_no_film  # needs bpy
+
+    metallic, (thickness, ior) = b.input("Metallic"), film(b)
+    if not metal_has_no_film() or is_zero(b, thickness) or is_zero(b, metallic):
+        return [(weight, metallic, (thickness, ior))]
+    rest, metal = b.op("mix_weights", weight, metallic)
+    parts = [(metal, 1.0, (0.0, ior)), (rest, 0.0, (thickness, ior))]
+    return parts[:1] if (number(b, metallic) or 0.0) >= 1.0 else parts
 
 
 def principled_top(b) -> tuple:

@@ -99,6 +99,7 @@ LAYERED = {
     "principled alpha": principled(Alpha=0.4),
     "principled thin film": principled(Roughness=0.2, Thin_Film_Thickness=400.0, Thin_Film_IOR=1.33),
     "principled thin film metal": principled(Metallic=1.0, Roughness=0.2, Thin_Film_Thickness=300.0),
+    "principled thin film half metal": principled(Metallic=0.5, Roughness=0.2, Thin_Film_Thickness=300.0),
     "principled thin wall": principled(
         Base_Color=(0.9, 0.95, 1.0), Transmission_Weight=1.0, Roughness=0.1, Thin_Wall=True
     ),
