@@ -13,7 +13,7 @@ from .film import export_film, frame_size
 from .images import release_scratch
 from .lights import export_light
 from .mesh import export_mesh
-from .objects import Collected, collect, place, stack_matrices
+from .objects import Collected, collect, place
 from .settings import export_settings, resolve
 from .shaders import Shaders
 from .warnings import Warnings
@@ -68,8 +68,7 @@ def export_active_camera(engine, depsgraph, width: int, height: int, warnings: W
 
 
 def export_lights(out: Scene, found: Collected, shaders: Shaders, warnings: Warnings) -> None:
-    matrices = stack_matrices([entry[2] for entry in found.lights])
-    for (name, light, _, visibility), matrix in zip(found.lights, matrices, strict=True):
+    for name, light, matrix, visibility in found.lights:
         lamp = export_light(name, light, matrix, visibility, shaders.light(light))
         if lamp:
             out.lights.append(lamp)

@@ -6,6 +6,7 @@ volumes are left out, under a warning.
 
 from __future__ import annotations
 
+from array import array
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -25,6 +26,7 @@ from ..scene_data import (
 from .ids import MASK, random_of_name
 from .warnings import Warnings
 
+MATRIX_BYTES = 64
 MATRICES_ARE_BUFFERS = bpy.app.version >= (5, 0, 0)
 UNSUPPORTED = {"CURVES": "hair curves", "POINTCLOUD": "point clouds", "VOLUME": "volumes"}
 VISIBILITY = {
@@ -35,6 +37,11 @@ VISIBILITY = {
     "visible_transmission": TRANSMISSION,
     "visible_volume_scatter": VOLUME,
 }
+
+
+def new_matrices() -> bytearray | array:
+    """Holds 16 floats an instance."""
+    return bytearray() if MATRICES_ARE_BUFFERS else array("f")
 
 
 @dataclass
@@ -54,7 +61,7 @@ class Prototype:
     parent: object  # bpy Object that instancer attributes are read from; the same where there is none
     is_plain: bool  # a mesh object of its own, with nothing that may take its faces away on purpose
     is_deformed: bool  # modifiers or shape keys may have moved its vertices
-    matrices: list = field(default_factory=list)  # 16 floats an instance
+    matrices: bytearray | array = field(default_factory=new_matrices)
     randoms: list[int] = field(default_factory=list)  # Blender's number for each; empty where it is not an instance
 
 
@@ -69,12 +76,20 @@ class Collected:
 def collect(depsgraph, warnings: Warnings) -> Collected:
     """Goes through all instances once. Never leaves the loop early: older versions then leak the whole list."""
     walk = Walk(depsgraph.view_layer_eval, warnings)
+    seen: dict[tuple, tuple] = {}
+    # A million instances come through here: no call and no attribute more than it takes. Blender gives the same Python
+    # object again for an ID as long as one is held, so that its id() will do as a key where asking for pointers is slow.
     for instance in depsgraph.object_instances:
-        if instance.show_self:
-            item = instance.object
-            data = item.data
-            if data is not None:
-                walk.visit(instance, item, data)
+        lasting, parent, data = instance.instance_object, instance.parent, instance.object.data
+        key = (id(lasting), id(parent), id(data))
+        if key in seen:
+            if adders := seen[key][0]:
+                adders[0](instance.matrix_world)
+                adders[1](instance.random_id)
+        elif data is not None and instance.show_self:
+            adders = walk.visit(instance)
+            if lasting is not None and adders is not None:
+                seen[key] = (adders, lasting, parent, data)
     return walk.found
 
 
@@ -83,35 +98,41 @@ class Walk:
         self.view_layer = view_layer
         self.warnings = warnings
         self.found = Collected()
-        self.known: dict[tuple, Prototype | None] = {}
+        # What takes the matrix and the number of further instances, by mesh, object and instancer.
+        self.known: dict[tuple, tuple] = {}
 
-    def visit(self, instance, item, data) -> None:
-        # A million instances come through here; the kind of their data tells what they are at the least cost.
-        kind = data.__class__
-        if kind is bpy.types.Mesh:
-            self.visit_mesh(instance, item, data)
-        elif issubclass(kind, bpy.types.Light):
-            visibility = self.visibility(item, instance.parent if instance.is_instance else item)
-            self.note_linking(item)
-            self.found.lights.append((item.name, data, matrix_of(instance), visibility))
-        elif item.type in UNSUPPORTED:
-            self.warnings.add(f"{UNSUPPORTED[item.type]} are not supported yet; left out", item.name)
-
-    def visit_mesh(self, instance, item, mesh) -> None:
-        if not instance.is_instance:
-            prototype = self.add_prototype(item, item, item, mesh)
-        else:
-            # Duplicated objects are temporaries that Blender reuses; the object they were made from lasts.
-            lasting, parent = instance.instance_object, instance.parent
-            key = (mesh.as_pointer(), lasting.as_pointer() if lasting else 0, parent.as_pointer())
-            try:
-                prototype = self.known[key]
-            except KeyError:
-                prototype = self.known[key] = self.add_prototype(item, lasting or parent, parent, mesh)
+    def visit(self, instance) -> tuple | None:
+        """What takes the matrix and the number of further instances; () if nothing does, None if visit() wants them."""
+        item = instance.object
+        # Duplicated objects are temporaries that Blender reuses; the object they were made from lasts.
+        lasting, data = instance.instance_object, item.data
+        if isinstance(data, bpy.types.Mesh):
+            if lasting:
+                return self.visit_duplicate(instance, item, lasting, data)
+            prototype = self.add_prototype(item, item, item, data)
             if prototype:
-                prototype.randoms.append(instance.random_id)
-        if prototype:
-            prototype.matrices.append(matrix_of(instance))
+                adder(prototype.matrices)(instance.matrix_world)
+            return None
+        if isinstance(data, bpy.types.Light):
+            visibility = self.visibility(item, instance.parent if lasting else item)
+            self.note_linking(item)
+            self.found.lights.append((item.name, data, np.array(instance.matrix_world, np.float32), visibility))
+            return None
+        if item.type in UNSUPPORTED:
+            self.warnings.add(f"{UNSUPPORTED[item.type]} are not supported yet; left out", item.name)
+        return ()
+
+    def visit_duplicate(self, instance, item, lasting, mesh) -> tuple:
+        parent = instance.parent
+        key = (mesh.as_pointer(), lasting.as_pointer(), parent.as_pointer())
+        if key not in self.known:
+            prototype = self.add_prototype(item, lasting, parent, mesh)
+            self.known[key] = (adder(prototype.matrices), prototype.randoms.append) if prototype else ()
+        if self.known[key]:
+            add_matrix, add_random = self.known[key]
+            add_matrix(instance.matrix_world)
+            add_random(instance.random_id)
+        return self.known[key]
 
     def add_prototype(self, item, lasting, parent, mesh) -> Prototype | None:
         """None for what no ray sees."""
@@ -169,19 +190,18 @@ def has_shape_keys(item) -> bool:
     return getattr(item.original.data, "shape_keys", None) is not None
 
 
-def matrix_of(instance):
-    # Read in the cheapest way: as a whole from 5.0 on, where matrices are buffers; before that by flattening in C.
+def adder(matrices):
+    """Appends a matrix in the cheapest way: as a buffer from 5.0 on, before that by flattening in C."""
     if MATRICES_ARE_BUFFERS:
-        return instance.matrix_world.copy()
-    return list(chain.from_iterable(instance.matrix_world))
+        return matrices.extend
+    return lambda matrix: matrices.extend(chain.from_iterable(matrix))
 
 
-def stack_matrices(matrices: list) -> np.ndarray:
-    """(n, 4, 4) float32, of what matrix_of gave."""
-    if MATRICES_ARE_BUFFERS:
-        columns = np.frombuffer(b"".join(matrices), np.float32).reshape(-1, 4, 4)
-        return np.ascontiguousarray(columns.transpose(0, 2, 1))
-    return np.array(matrices, np.float32).reshape(-1, 4, 4)
+def stack_matrices(prototypes: list[Prototype]) -> np.ndarray:
+    """(n, 4, 4) float32 of all prototypes, one after the other."""
+    numbers = np.frombuffer(b"".join(prototype.matrices for prototype in prototypes), np.float32).reshape(-1, 4, 4)
+    # Buffers go by columns.
+    return np.ascontiguousarray(numbers.transpose(0, 2, 1)) if MATRICES_ARE_BUFFERS else numbers
 
 
 def usable(matrices: np.ndarray) -> np.ndarray:
@@ -198,11 +218,11 @@ def place(
 ) -> list[Instance]:
     """Instances of all prototypes that have a mesh; the three lists go by prototype."""
     instances = []
-    stacked = stack_matrices(list(chain.from_iterable(prototype.matrices for prototype in found.prototypes)))
+    stacked = stack_matrices(found.prototypes)
     every_good = usable(stacked)
     end = 0
     for prototype, mesh, programs, values in zip(found.prototypes, meshes, slots, attributes, strict=True):
-        start, end = end, end + len(prototype.matrices)
+        start, end = end, end + len(memoryview(prototype.matrices).cast("B")) // MATRIX_BYTES
         if mesh is None:
             continue
         matrices, good, randoms = stacked[start:end], every_good[start:end], randoms_of(prototype)
