@@ -29,6 +29,7 @@ from .warnings import Warnings
 MATRIX_BYTES = 64
 MATRICES_ARE_BUFFERS = bpy.app.version >= (5, 0, 0)
 UNSUPPORTED = {"CURVES": "hair curves", "POINTCLOUD": "point clouds", "VOLUME": "volumes"}
+IGNORED = (bpy.types.Curve, bpy.types.MetaBall, bpy.types.Camera, bpy.types.Armature, bpy.types.Lattice)
 VISIBILITY = {
     "visible_camera": CAMERA,
     "visible_shadow": SHADOW,
@@ -77,16 +78,23 @@ def collect(depsgraph, warnings: Warnings) -> Collected:
     """Goes through all instances once. Never leaves the loop early: older versions then leak the whole list."""
     walk = Walk(depsgraph.view_layer_eval, warnings)
     seen: dict[tuple, tuple] = {}
+    # Data that gives nothing: that of empties, and of curves (which come as meshes, too).
+    ignored: dict[int, object] = {id(None): None}
     # A million instances come through here: no call and no attribute more than it takes. Blender gives the same Python
     # object again for an ID as long as one is held, so that its id() will do as a key where asking for pointers is slow.
     for instance in depsgraph.object_instances:
-        lasting, parent, data = instance.instance_object, instance.parent, instance.object.data
+        data = instance.object.data
+        if id(data) in ignored:
+            continue
+        lasting, parent = instance.instance_object, instance.parent
         key = (id(lasting), id(parent), id(data))
         if key in seen:
             if adders := seen[key][0]:
                 adders[0](instance.matrix_world)
                 adders[1](instance.random_id)
-        elif data is not None and instance.show_self:
+        elif isinstance(data, IGNORED):
+            ignored[id(data)] = data
+        elif instance.show_self:
             adders = walk.visit(instance)
             if lasting is not None and adders is not None:
                 seen[key] = (adders, lasting, parent, data)

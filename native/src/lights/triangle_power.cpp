@@ -10,7 +10,7 @@ namespace gi {
 
 namespace {
 
-constexpr size_t kPointBudget = 100'000;  // evaluations, about; at least kLeastPoints a side
+constexpr size_t kPointBudget = 50'000;  // evaluations, about; at least kLeastPoints a side
 constexpr int kLeastPoints = 4, kMostPoints = 64;
 
 struct Candidate {
