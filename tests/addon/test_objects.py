@@ -170,6 +170,38 @@ def test_collection_instances_nest(scene, render_export):
     np.testing.assert_allclose(named(exported.scene.lights, "Lamp").matrix[:3, 3], (5, 0, 7))
 
 
+def test_duplicates_of_all_kinds_under_two_instancers(scene, render_export):
+    """Each kind in its place, though Blender hands them out mixed and by the same temporary object."""
+    duplicated = bpy.data.collections.new("Duplicated")
+    for item in (
+        bpy.data.objects.new("Quad", mesh()),
+        bpy.data.objects.new("Unseen", mesh()),
+        bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT")),
+        bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye")),
+        bpy.data.objects.new("Nothing", None),
+        curve_object(scene),
+    ):
+        item.location = (1, 0, 0)
+        for collection in item.users_collection:
+            collection.objects.unlink(item)
+        duplicated.objects.link(item)
+    unseen = duplicated.objects["Unseen"]
+    for name in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
+        setattr(unseen, f"visible_{name}", False)
+    for x in range(6):
+        empty = add(scene, f"Empty {x}", None, location=(10 * x, 0, 0))
+        empty.instance_type, empty.instance_collection = "COLLECTION", duplicated
+        empty.visible_shadow = x != 0
+    exported = render_export().scene
+    curve = next(item.name for item in duplicated.objects if item.type == "CURVE")
+    for name in ("Quad", curve):
+        found = [i for i in exported.instances if i.name == name]
+        assert sorted(place[0] for i in found for place in places(i)) == [1, 11, 21, 31, 41, 51]
+        assert sum(i.count for i in found if not i.visibility & SHADOW) == 1
+    assert {i.name for i in exported.instances} == {"Quad", curve}
+    assert sorted(lamp.matrix[0, 3] for lamp in exported.lights if lamp.name == "Lamp") == [1, 11, 21, 31, 41, 51]
+
+
 def test_vertex_instances(scene, render_export):
     carrier = add(scene, "Carrier", grid(4), instance_type="VERTS", show_instancer_for_render=False)
     leaf = add(scene, "Leaf", mesh())
