@@ -20,6 +20,7 @@ inline float to_unit_float(uint32_t x) { return float(x >> 8) * 0x1p-24f; }  // 
 
 class Sampler {
  public:
+  Sampler() {}  // to be assigned
   // `stream` is the pixel or light path, `index` the pass: one stream over all passes is one stratified sequence.
   Sampler(uint32_t seed, uint32_t stream, uint32_t index) : index_(reverse_bits(index)), key_(hash_combine(seed, stream)) {}
 
@@ -51,10 +52,10 @@ class Sampler {
     x ^= x * 0x3d20adeau, x += seed, x *= (seed >> 16) | 1u, x ^= x * 0x05526c56u;
     return x ^ (x * 0x53a22864u);
   }
-  // Second Sobol dimension (Pascal matrix modulo 2) of a bit-reversed index.
+  // Second Sobol dimension (Pascal matrix modulo 2) of an index, its bits reversed.
   static uint32_t sobol_1(uint32_t v) {
-    v ^= v << 16, v ^= (v << 8) & 0xff00ff00u, v ^= (v << 4) & 0xf0f0f0f0u, v ^= (v << 2) & 0xccccccccu;
-    return v ^ ((v << 1) & 0xaaaaaaaau);
+    v ^= v >> 16, v ^= (v >> 8) & 0x00ff00ffu, v ^= (v >> 4) & 0x0f0f0f0fu, v ^= (v >> 2) & 0x33333333u;
+    return v ^ ((v >> 1) & 0x55555555u);
   }
   void fill() {
     const uint32_t first = dimension_ & ~kMask;
@@ -62,14 +63,14 @@ class Sampler {
       const uint32_t h = hash32(key_ ^ ((first + k) * 0x9e3779b9u));
       uint32_t hx = h * 0x85ebca6bu + 0x3c6ef372u, hy = h * 0xc2b2ae35u + 0x1b873593u;
       hx ^= hx >> 15, hy ^= hy >> 15;
-      const uint32_t shuffled = permute(index_, h);
-      x_[k] = to_unit_float(reverse_bits(permute(reverse_bits(shuffled), hx)));
-      y_[k] = to_unit_float(reverse_bits(permute(reverse_bits(sobol_1(shuffled)), hy)));
+      const uint32_t shuffled = reverse_bits(permute(index_, h));
+      x_[k] = to_unit_float(reverse_bits(permute(shuffled, hx)));
+      y_[k] = to_unit_float(reverse_bits(permute(sobol_1(shuffled), hy)));
     }
   }
 
   static constexpr uint32_t kBatch = 4, kMask = kBatch - 1;  // what one vector register holds
-  uint32_t index_, key_, dimension_ = 0;
+  uint32_t index_ = 0, key_ = 0, dimension_ = 0;
   bool has_spare_ = false;
   float spare_ = 0;
   float x_[kBatch], y_[kBatch];

@@ -15,27 +15,31 @@ struct PassRule {
   const char* name;
   int channels;
   Keep keep;
-  void (*write)(const PixelSample&, float exposure, float*);
+  void (*add)(const PixelSample&, float exposure, float* sum);
 };
 
 namespace {
 
-void write_rgb(Rgb c, float* out) { out[0] = c.r, out[1] = c.g, out[2] = c.b; }
-void write_vec(Vec3 v, float* out) { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
+void add_number(float x, float* sum) { *sum += std::isfinite(x) ? x : 0.0f; }
+void add_rgb(Rgb c, float* sum) { add_number(c.r, sum), add_number(c.g, sum + 1), add_number(c.b, sum + 2); }
+void add_vec(Vec3 v, float* sum) { add_number(v.x, sum), add_number(v.y, sum + 1), add_number(v.z, sum + 2); }
+void add_combined(const PixelSample& s, float exposure, float* sum) {  // known to be finite
+  const Rgb c = s.radiance * exposure;
+  sum[0] += c.r, sum[1] += c.g, sum[2] += c.b, sum[3] += s.alpha;
+}
 
 const PassRule kPassRules[] = {
-    {"Combined", 4, Keep::kLight,
-     [](const PixelSample& s, float exposure, float* o) { write_rgb(s.radiance * exposure, o), o[3] = s.alpha; }},
-    {"Depth", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { o[0] = s.depth; }},
-    {"Position", 3, Keep::kFirst, [](const PixelSample& s, float, float* o) { write_vec(s.position, o); }},
-    {"Normal", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { write_vec(s.normal, o); }},
-    {"UV", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { o[0] = s.uv.x, o[1] = s.uv.y, o[2] = s.has_uv ? 1.0f : 0.0f; }},
-    {"Denoising Albedo", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { write_rgb(s.albedo, o); }},
-    {"Denoising Normal", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { write_vec(s.normal, o); }},
-    {"Object Index", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { o[0] = s.object_index; }},
-    {"Material Index", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { o[0] = s.material_index; }},
-    {"Emission", 3, Keep::kLight, [](const PixelSample& s, float exposure, float* o) { write_rgb(s.emission * exposure, o); }},
-    {"Environment", 3, Keep::kLight, [](const PixelSample& s, float exposure, float* o) { write_rgb(s.environment * exposure, o); }},
+    {"Combined", 4, Keep::kLight, add_combined},
+    {"Depth", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { add_number(s.depth, o); }},
+    {"Position", 3, Keep::kFirst, [](const PixelSample& s, float, float* o) { add_vec(s.position, o); }},
+    {"Normal", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { add_vec(s.normal, o); }},
+    {"UV", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { add_vec({s.uv.x, s.uv.y, s.has_uv ? 1.0f : 0.0f}, o); }},
+    {"Denoising Albedo", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { add_rgb(s.albedo, o); }},
+    {"Denoising Normal", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { add_vec(s.normal, o); }},
+    {"Object Index", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { add_number(s.object_index, o); }},
+    {"Material Index", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { add_number(s.material_index, o); }},
+    {"Emission", 3, Keep::kLight, [](const PixelSample& s, float exposure, float* o) { add_rgb(s.emission * exposure, o); }},
+    {"Environment", 3, Keep::kLight, [](const PixelSample& s, float exposure, float* o) { add_rgb(s.environment * exposure, o); }},
 };
 constexpr const char* kSampleCount = "Debug Sample Count";
 
@@ -77,11 +81,11 @@ Film::Film(FilmSpec spec) : spec_(std::move(spec)), filter_(spec_.filter, spec_.
   luminance_square_sum_.assign(pixels, 0.0f);
 }
 
-void Film::add_tile(int tile, int pass, const PixelSample* samples) {
+void Film::add_row(int tile, int y, int pass, const PixelSample* samples) {
   const Tile& t = tiles_[size_t(tile)];
   const std::lock_guard lock(tile_mutex_[size_t(tile)]);
-  for (int y = t.y0; y < t.y1; ++y)
-    for (int x = t.x0; x < t.x1; ++x) add_sample(size_t(y) * size_t(spec_.region_width()) + size_t(x), pass == 0, *samples++);
+  const size_t first = size_t(y) * size_t(spec_.region_width());
+  for (int x = t.x0; x < t.x1; ++x) add_sample(first + size_t(x), pass == 0, *samples++);
 }
 
 void Film::add_sample(size_t pixel, bool first, const PixelSample& s) {
@@ -96,17 +100,9 @@ void Film::add_sample(size_t pixel, bool first, const PixelSample& s) {
     ++bad_samples_;  // its light is left out of sums and counts; what it hit is still good
   }
   for (Layer& layer : layers_) {
-    if (layer.rule->keep == Keep::kLight && !good) continue;
-    float value[4];
-    layer.rule->write(s, spec_.exposure, value);
-    const int n = layer.rule->channels;
-    float* sum = layer.sum.data() + pixel * size_t(n);
-    if (layer.rule->keep == Keep::kFirst) {
-      if (first) std::copy_n(value, n, sum);
-      continue;
-    }
-    for (int c = 0; c < n; ++c)
-      if (std::isfinite(value[c])) sum[c] += value[c];
+    const Keep keep = layer.rule->keep;
+    if ((keep == Keep::kLight && !good) || (keep == Keep::kFirst && !first)) continue;
+    layer.rule->add(s, spec_.exposure, layer.sum.data() + pixel * size_t(layer.rule->channels));
   }
 }
 

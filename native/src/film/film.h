@@ -55,8 +55,8 @@ class Film {
   static constexpr int kTileSize = 16;
   // Whether anything but light is asked for.
   bool has_data_passes() const { return has_data_passes_; }
-  // Adds one sample to each pixel of the tile, row by row.
-  void add_tile(int tile, int pass, const PixelSample* samples);
+  // Adds one sample to each pixel of a row of the tile; `y` within the region.
+  void add_row(int tile, int y, int pass, const PixelSample* samples);
 
   // Mean of a pass, (region height × region width × channels); "Sample Count" is the number itself.
   static int channels(const std::string& pass);  // 0 if there is no such pass

@@ -86,6 +86,7 @@ class PathIntegrator final : public Integrator {
     float least_pdf = kInf;   // of the directions so far, per steradian
 
     const auto add = [&](Rgb radiance, int depth) {
+      if (is_black(radiance)) return;
       result.radiance += clamp_contribution(path.throughput * radiance, depth > 1 ? s_.clamp_indirect : s_.clamp_direct);
     };
 

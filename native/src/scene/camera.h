@@ -28,22 +28,19 @@ struct Camera {
 
   // (x, y) in [0, 1]² over the full frame, origin at the lower left; `pixel` is the size of a pixel in those units.
   CameraRay sample(Vec2 film, Vec2 pixel, Vec2 u_lens) const {
+    if (kind == Kind::kPerspective && !(aperture_radius > 0.0f)) return sample_pinhole(film, pixel);
     CameraRay r;
     Vec3 origin, direction;
     float start = clip_start, end = clip_end;
     const float x = lerp(left, right, film.x), y = lerp(bottom, top, film.y);
-    const float pixel_size = 0.5f * std::max(std::abs(right - left) * pixel.x, std::abs(top - bottom) * pixel.y);
     if (kind == Kind::kPerspective) {
-      direction = Vec3{x, y, -1.0f};
-      if (aperture_radius > 0.0f) {
-        const Vec2 lens = sample_aperture(u_lens);
-        origin = {lens.x, lens.y, 0.0f};
-        direction = direction * focus_distance - origin;
-      }
+      const Vec2 lens = sample_aperture(u_lens);
+      origin = {lens.x, lens.y, 0.0f};
+      direction = Vec3{x, y, -1.0f} * focus_distance - origin;
       // Clip planes are at distances along the axis, not along the ray.
       const float scale = length(direction) / -direction.z;
       start *= scale, end *= scale;
-      r.spread = pixel_size;
+      r.spread = pixel_radius(pixel);
     } else if (kind == Kind::kOrthographic) {
       origin = {x, y, 0.0f}, direction = {0, 0, -1};
       if (aperture_radius > 0.0f) {
@@ -54,7 +51,7 @@ struct Camera {
         const float scale = length(direction) / -direction.z;
         start *= scale, end *= scale;
       }
-      r.footprint = pixel_size;
+      r.footprint = pixel_radius(pixel);
     } else {  // equirectangular: the middle of the frame looks ahead
       const float phi = lerp(longitude[0], longitude[1], film.x), theta = lerp(latitude[0], latitude[1], film.y);
       direction = {std::sin(phi) * std::cos(theta), std::sin(theta), -std::cos(phi) * std::cos(theta)};
@@ -81,6 +78,15 @@ struct Camera {
   }
 
  private:
+  float pixel_radius(Vec2 pixel) const { return 0.5f * std::max(std::abs(right - left) * pixel.x, std::abs(top - bottom) * pixel.y); }
+
+  // The commonest camera: as `sample`, without what it has no need of.
+  CameraRay sample_pinhole(Vec2 film, Vec2 pixel) const {
+    const Vec3 direction = to_world.vector({lerp(left, right, film.x), lerp(bottom, top, film.y), -1.0f});
+    const float norm = length(direction), start = clip_start * norm, spread = pixel_radius(pixel);
+    return {{to_world.translation() + direction * clip_start, direction / norm, 0.0f, (clip_end - clip_start) * norm}, spread, spread * start};
+  }
+
   Vec2 sample_aperture(Vec2 u) const {
     Vec2 lens;
     if (aperture_blades < 3) {

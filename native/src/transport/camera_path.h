@@ -7,27 +7,31 @@
 
 namespace gi {
 
-// Calls f(camera ray, sampler, sample to fill) for every pixel of the film, tile by tile in threads.
+// Calls f(camera ray, sampler, sample to fill) for every pixel of the film, tile by tile in threads. Row by row within: all its
+// rays are made at once, which hides how long each takes.
 template <class F>
 void for_each_pixel(const RenderContext& context, int pass, Film& film, const F& f) {
   const FilmSpec& spec = film.spec();
   const Vec2 pixel{1.0f / float(spec.width), 1.0f / float(spec.height)};
   context.pool.for_each(int(film.tiles().size()), context.cancelled, [&](int index) {
     const Tile& tile = film.tiles()[size_t(index)];
-    PixelSample samples[Film::kTileSize * Film::kTileSize];
-    PixelSample* sample = samples;
     for (int y = tile.y0; y < tile.y1; ++y) {
-      for (int x = tile.x0; x < tile.x1; ++x) {
+      Sampler samplers[Film::kTileSize];
+      CameraRay rays[Film::kTileSize];
+      PixelSample samples[Film::kTileSize];
+      const int width = tile.x1 - tile.x0;
+      for (int i = 0; i < width; ++i) {
         // Keyed by the place in the full frame: a region shows what the whole picture would.
-        const int px = spec.x0 + x, py = spec.y0 + y;
-        Sampler sampler(context.seed, uint32_t(py) * uint32_t(spec.width) + uint32_t(px), uint32_t(pass));
+        const int px = spec.x0 + tile.x0 + i, py = spec.y0 + y;
+        Sampler& sampler = samplers[i] = Sampler(context.seed, uint32_t(py) * uint32_t(spec.width) + uint32_t(px), uint32_t(pass));
         const Vec2 offset = film.filter().sample(sampler.next_2d());
         const Vec2 lens = sampler.next_2d();
         const Vec2 at{(float(px) + 0.5f + offset.x) * pixel.x, (float(py) + 0.5f + offset.y) * pixel.y};
-        f(context.camera.sample(at, pixel, lens), sampler, *sample++);
+        rays[i] = context.camera.sample(at, pixel, lens);
       }
+      for (int i = 0; i < width; ++i) f(rays[i], samplers[i], samples[i]);
+      film.add_row(index, y, pass, samples);
     }
-    film.add_tile(index, pass, samples);
     ++context.tiles_done;
   });
 }
