@@ -16,25 +16,33 @@ struct TriangleLight {
   uint32_t instance = 0, triangle = 0;
   uint32_t material = 0;
   bool front = true, back = true;  // which sides are sampled; front is where ab × ac points
+  Vec3 n;           // ab × ac
+  float edge2 = 0;  // longest, squared
 
-  Vec3 normal() const { return normalize(cross(ab, ac)); }
-  float area() const { return 0.5f * length(cross(ab, ac)); }
+  TriangleLight() = default;
+  explicit TriangleLight(const Vec3 v[3])
+      : a(v[0]),
+        ab(v[1] - v[0]),
+        ac(v[2] - v[0]),
+        n(cross(ab, ac)),
+        edge2(std::max({length_squared(ab), length_squared(ac), length_squared(ac - ab)})) {}
+
+  Vec3 normal() const { return normalize(n); }
+  float area() const { return 0.5f * length(n); }
 
   std::optional<TriangleSample> sample(Vec3 position, Vec2 u) const {
-    const Vec3 n = cross(ab, ac);
-    if (!shines_to(position, n)) return std::nullopt;
-    if (is_near(position, n)) {
+    if (!shines_to(position)) return std::nullopt;
+    if (is_near(position)) {
       const Corners c(*this, position);
       if (c.by_angle) return sample_by_angle(c, position, u);
     }
-    return sample_by_area(position, n, u);
+    return sample_by_area(position, u);
   }
 
   // Density of `sample` at the point in direction `wi`, which is on the triangle.
   float pdf_dir(Vec3 position, Vec3 wi) const {
-    const Vec3 n = cross(ab, ac);
-    if (!shines_to(position, n)) return 0.0f;
-    if (is_near(position, n)) {
+    if (!shines_to(position)) return 0.0f;
+    if (is_near(position)) {
       const Corners c(*this, position);
       if (c.by_angle) return 1.0f / c.solid_angle;
     }
@@ -51,9 +59,8 @@ struct TriangleLight {
   static constexpr float kFar = 8.0f;  // in edges
 
   // Whether it fills so much of the view that 1/cos and 1/d² change across it.
-  bool is_near(Vec3 position, Vec3 n) const {
+  bool is_near(Vec3 position) const {
     const Vec3 to = a - position;
-    const float edge2 = std::max({length_squared(ab), length_squared(ac), length_squared(ac - ab)});
     return sqr(dot(to, n)) < edge2 * length_squared(n) && length_squared(to) < sqr(kFar) * edge2;
   }
 
@@ -69,9 +76,9 @@ struct TriangleLight {
     }
   };
 
-  bool shines_to(Vec3 position, Vec3 n) const { return dot(position - a, n) > 0.0f ? front : back; }
+  bool shines_to(Vec3 position) const { return dot(position - a, n) > 0.0f ? front : back; }
 
-  std::optional<TriangleSample> sample_by_area(Vec3 position, Vec3 n, Vec2 u) const {
+  std::optional<TriangleSample> sample_by_area(Vec3 position, Vec2 u) const {
     const Vec2 b = sample_triangle(u);
     const Vec3 to = a + ab * b.x + ac * b.y - position;
     const float distance = length(to), twice_area = length(n);

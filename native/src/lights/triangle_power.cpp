@@ -66,7 +66,7 @@ MeasuredTriangle measure(const Scene& scene, Candidate c, int points) {
   MeasuredTriangle m;
   Vec3 v[3];
   scene.triangle_vertices(c.instance, c.triangle, v);
-  m.light.a = v[0], m.light.ab = v[1] - v[0], m.light.ac = v[2] - v[0];
+  m.light = TriangleLight(v);
   m.light.instance = c.instance, m.light.triangle = c.triangle;
   m.light.material = uint32_t(scene.material_of(c.instance, c.triangle));
   const Vec3 n = m.light.normal();

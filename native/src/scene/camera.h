@@ -84,7 +84,8 @@ struct Camera {
   CameraRay sample_pinhole(Vec2 film, Vec2 pixel) const {
     const Vec3 direction = to_world.vector({lerp(left, right, film.x), lerp(bottom, top, film.y), -1.0f});
     const float norm = length(direction), start = clip_start * norm, spread = pixel_radius(pixel);
-    return {{to_world.translation() + direction * clip_start, direction / norm, 0.0f, (clip_end - clip_start) * norm}, spread, spread * start};
+    return {
+        {to_world.translation() + direction * clip_start, direction / norm, 0.0f, (clip_end - clip_start) * norm}, spread, spread * start};
   }
 
   Vec2 sample_aperture(Vec2 u) const {

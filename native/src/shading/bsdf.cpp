@@ -50,7 +50,7 @@ Bsdf::Entry* Bsdf::new_entry(Rgb weight, uint8_t flags, const Frame& frame) {
   const uint8_t left = flags & ~sides_without(flags, without_);
   if (!(left & (kReflection | kTransmission))) return nullptr;
   Entry& e = entries_[count_++];
-  e.frame = frame, e.weight = w, e.select = 0.0f, e.flags = left, e.bumped = !(frame.z == ns_);
+  e.frame = frame, e.weight = w, e.albedo = -1.0f, e.flags = left, e.bumped = !(frame.z == ns_);
   flags_ |= left;
   return &e;
 }
@@ -61,7 +61,8 @@ void Bsdf::finish(Vec3 wo) {
   select_transparent_ = sum;
   for (int i = 0; i < count_; ++i) {
     Entry& e = entries_[i];
-    e.select = single ? 1.0f : std::max(kLeastShare * average(e.weight), average(e.weight * albedo_of(e.lobe, e.frame.to_local(wo))));
+    if (e.albedo < 0.0f && !single) e.albedo = average(e.weight * albedo_of(e.lobe, e.frame.to_local(wo)));
+    e.select = single ? 1.0f : std::max(kLeastShare * average(e.weight), e.albedo);
     sum += e.select;
   }
   if (select_transparent_ > 0.0f) flags_ |= kTransparent;

@@ -41,9 +41,11 @@ class Bsdf {
 
   // Adds `lobe` in the frame whose z is the lobe's own (bumped) normal. Negative components count as 0; weights that come to
   // nothing are dropped, and so are lobes beyond kMaxLobes.
+  // `albedo`: of the lobe towards the viewer, where the caller has it already.
   template <class L>
-  void add(Rgb weight, const L& lobe, const Frame& frame) {
+  void add(Rgb weight, const L& lobe, const Frame& frame, const Rgb* albedo = nullptr) {
     if (Entry* e = new_entry(weight, lobe.flags(), frame)) {
+      if (albedo && e->flags == lobe.flags()) e->albedo = average(e->weight * *albedo);
       std::construct_at(&e->lobe, std::in_place_type<L>, lobe);
       if constexpr (requires(L l) { l.remove(uint8_t(0)); }) {
         if (e->flags != lobe.flags()) std::get<L>(e->lobe).remove(lobe.flags() & ~e->flags);
@@ -85,7 +87,8 @@ class Bsdf {
     Lobe lobe;
     Frame frame;
     Rgb weight;
-    float select = 0;  // probability
+    float albedo = -1;  // weight included, mean of the channels; negative: not known yet
+    float select = 0;   // probability
     uint8_t flags = 0;
     bool bumped = false;  // its normal is not ns_
   };

@@ -7,8 +7,8 @@ namespace gi {
 
 // Adds a lobe about normal `n`, with `tangent` as the frame's x axis unless it is zero.
 template <class L>
-void add_lobe(ShadeState& s, Rgb weight, const L& lobe, Vec3 n, Vec3 tangent) {
-  s.bsdf->add(weight, lobe, Frame::from_normal_and_tangent(n, tangent));
+void add_lobe(ShadeState& s, Rgb weight, const L& lobe, Vec3 n, Vec3 tangent, const Rgb* albedo = nullptr) {
+  s.bsdf->add(weight, lobe, tangent == Vec3{} ? Frame::from_normal(n) : Frame::from_normal_and_tangent(n, tangent), albedo);
 }
 template <class L>
 void add_lobe(ShadeState& s, Rgb weight, const L& lobe, Vec3 n) {

@@ -11,8 +11,9 @@ constexpr float kCutoff = 1e-5f;
 Rgb add_ggx(ShadeState& s, Rgb weight, GgxLobe lobe, Vec3 n, Vec3 tangent, bool preserve_energy, bool add = true) {
   const Vec3 wo{0, 0, dot(n, s.point.wo)};  // albedos depend on the cosine only
   if (preserve_energy) lobe.preserve_energy(clamp01(wo.z));
-  if (add) add_lobe(s, weight, lobe, n, tangent);
-  return weight * lobe.albedo(wo);
+  const Rgb albedo = lobe.albedo(wo);
+  if (add) add_lobe(s, weight, lobe, n, tangent, &albedo);
+  return weight * albedo;
 }
 
 Rgb add_sheen(ShadeState& s, const PrincipledTop& p, Vec3 normal, Vec3 coat_normal, Rgb weight, bool add) {
@@ -140,11 +141,13 @@ void add_principled(ShadeState& s, const Principled& p, Rgb weight) {
   if (p.metallic > kCutoff) {
     add_metal(s, p, n, weight * p.metallic);
     weight *= 1.0f - p.metallic;
+    if (is_black(weight)) return;
   }
   if (p.transmission > kCutoff) {
     const Rgb share = weight * p.transmission;
     p.thin_wall ? add_thin_glass(s, p, n, share) : add_glass(s, p, n, share);
     weight *= 1.0f - p.transmission;
+    if (is_black(weight)) return;
   }
   add_base(s, p, add_specular(s, p, n, weight));
 }
