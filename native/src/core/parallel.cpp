@@ -2,6 +2,9 @@
 #include "core/parallel.h"
 
 #include <exception>
+#if defined(__linux__)
+#include <pthread.h>
+#endif
 #if defined(__SSE__)
 #include <pmmintrin.h>
 #include <xmmintrin.h>
@@ -36,6 +39,9 @@ void ThreadPool::for_each(int count, const std::atomic<bool>& stop, const std::f
 }
 
 void ThreadPool::work() {
+#if defined(__linux__)
+  pthread_setname_np(pthread_self(), "gi-render");  // for profilers
+#endif
 #if defined(__SSE__)
   _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
   _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
