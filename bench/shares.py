@@ -53,7 +53,7 @@ def shares(path: Path, options) -> dict[str, float]:
         lines = subprocess.run(report, check=True, capture_output=True, text=True).stdout.splitlines()
     found = dict.fromkeys(GROUPS, 0.0)
     for line in lines:
-        match = re.match(r"\s*([\d.]+)%;\s*([^;]*);(.*)", line)
+        match = re.match(r"\s*([\d.]+)%\s*;\s*([^;]*?)\s*;(.*)", line)
         if match:
             found[group_of(match[2], match[3])] += float(match[1])
     total = sum(found.values())
