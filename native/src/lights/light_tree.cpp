@@ -83,84 +83,108 @@ LightBounds merge(const LightBounds& a, const LightBounds& b) {
   return r;
 }
 
-float light_importance(const LightCluster& b, const LightQuery& query) {
-  const Vec3 to = query.position - b.center;
-  const float d2 = length_squared(to);
-  const bool has_normal = length_squared(query.normal) > 0.0f;
-  if (!(d2 > b.radius2)) return b.power / std::max(b.radius2, 1e-12f);  // among the lights every angle is possible
-  const float inverse2 = 1.0f / d2, inverse = std::sqrt(inverse2), sin2_bounds = b.radius2 * inverse2;
-  const float sin_bounds = std::sqrt(sin2_bounds), cos_bounds = safe_sqrt(1.0f - sin2_bounds);
-  float importance = b.power * inverse2;
-
-  // The least angle to a normal, over all the cluster's places and normals: θ − θ_normals − θ_bounds.
-  if (b.cos_normals > -1.0f) {
-    float c = dot(to, b.axis) * inverse;
-    if (b.two_sided) c = std::abs(c);
-    if (c < b.cos_normals) {
-      c = c * b.cos_normals + safe_sqrt(1.0f - c * c) * b.sin_normals;
-      if (c < cos_bounds) {
-        c = c * cos_bounds + safe_sqrt(1.0f - c * c) * sin_bounds;
-        if (c < b.cos_emission - 1e-4f) return 0.0f;
-        importance *= std::max(c, 0.01f);
-      }
-    }
-  }
-
-  // Receiver. Its lobes may have bumped normals, so nothing is ruled out.
-  if (has_normal) {
-    float c = -dot(to, query.normal) * inverse;
-    if (query.transmission) c = std::abs(c);
-    if (c < cos_bounds) importance *= std::max(c * cos_bounds + safe_sqrt(1.0f - c * c) * sin_bounds, 0.02f);
-  }
-  return importance;
+void LightTree::Node::set(uint32_t k, const LightBounds& b) {
+  const Vec3 center = (b.lo + b.hi) * 0.5f;
+  center_x[k] = center.x, center_y[k] = center.y, center_z[k] = center.z;
+  radius2[k] = 0.25f * length_squared(b.hi - b.lo);
+  axis_x[k] = b.axis.x, axis_y[k] = b.axis.y, axis_z[k] = b.axis.z, power[k] = b.power;
+  cos_normals[k] = b.cos_normals, sin_normals[k] = safe_sqrt(1.0f - b.cos_normals * b.cos_normals), cos_emission[k] = b.cos_emission;
+  sides[k] = b.two_sided ? 2.0f : 1.0f;
 }
 
-LightTree::LightTree(const std::vector<LightBounds>& lights) : slot_of_(lights.size()), leaf_of_(lights.size()) {
+// Without branches, so that the compiler does four at a time.
+LightTree::Importance LightTree::importance(const Node& n, const LightQuery& query) {
+  const Vec3 p = query.position, m = query.normal;
+  const float has_normal = length_squared(m) > 0.0f ? 1.0f : 0.0f, through = query.transmission ? 1.0f : 0.0f;
+  Importance result;
+  for (uint32_t k = 0; k < kWidth; ++k) {
+    const float x = p.x - n.center_x[k], y = p.y - n.center_y[k], z = p.z - n.center_z[k];
+    const float d2 = x * x + y * y + z * z, r2 = n.radius2[k];
+    const float inverse2 = 1.0f / std::max(d2, 1e-30f), inverse = std::sqrt(inverse2), sin2 = std::min(r2 * inverse2, 1.0f);
+    const float sin_bounds = std::sqrt(sin2), cos_bounds = std::sqrt(1.0f - sin2);
+
+    // The least angle to a normal, over all the cluster's places and normals: θ − θ_normals − θ_bounds.
+    const float c = (x * n.axis_x[k] + y * n.axis_y[k] + z * n.axis_z[k]) * inverse, facing = n.sides[k] > 1.0f ? std::abs(c) : c;
+    const float past_normals = facing * n.cos_normals[k] + std::sqrt(std::max(1.0f - facing * facing, 0.0f)) * n.sin_normals[k];
+    const float c1 = facing < n.cos_normals[k] ? past_normals : 1.0f;
+    const float past_bounds = c1 * cos_bounds + std::sqrt(std::max(1.0f - c1 * c1, 0.0f)) * sin_bounds;
+    const float c2 = c1 < cos_bounds ? past_bounds : 1.0f;
+    const float emitter = c2 < n.cos_emission[k] - 1e-4f ? 0.0f : std::max(c2, 0.01f);
+
+    // Receiver. Its lobes may have bumped normals, so nothing is ruled out.
+    const float cr = -(x * m.x + y * m.y + z * m.z) * inverse, seen = through > 0.0f ? std::abs(cr) : cr;
+    const float within = std::max(seen * cos_bounds + std::sqrt(std::max(1.0f - seen * seen, 0.0f)) * sin_bounds, 0.02f);
+    const float receiver = has_normal > 0.0f && seen < cos_bounds ? within : 1.0f;
+
+    // Among the lights every angle is possible.
+    const float outside = inverse2 * emitter * receiver, inside = 1.0f / std::max(r2, 1e-12f);
+    result.of[k] = n.power[k] * (d2 > r2 ? outside : inside);
+  }
+  return result;
+}
+
+// Top down: every node halves the costliest of its parts until it has four; bounds then come from below.
+LightTree::LightTree(const std::vector<LightBounds>& lights) : place_of_(lights.size()) {
   if (lights.empty()) return;
   std::vector<Item> items;
   items.reserve(lights.size());
   for (uint32_t i = 0; i < lights.size(); ++i) items.push_back({lights[i], lights[i].box().center(), i});
-  nodes_.reserve(lights.size() / 2 + 2);
-  nodes_.emplace_back();
-  build(items);
-  slots_.reserve(items.size()), order_.reserve(items.size());
-  for (const Item& item : items) slots_.emplace_back(item.bounds), order_.push_back(item.light);
-}
 
-void LightTree::build(std::vector<Item>& items) {
-  std::vector<LightBounds> bounds(1);  // of the nodes
+  struct Part {
+    uint32_t begin, end;
+    float cost;
+  };
+  const auto part = [&](uint32_t begin, uint32_t end) {
+    Bin sum;
+    for (uint32_t i = begin; i < end; ++i) sum.add(items[i].bounds);
+    return Part{begin, end, end - begin > 1 ? std::max(sum.cost(), 0.0f) : -1.0f};
+  };
   struct Task {
     uint32_t node, begin, end;
   };
+  std::vector<LightBounds> bounds(kWidth);  // of the nodes' children
+  nodes_.emplace_back();
   std::vector<Task> tasks{{0, 0, uint32_t(items.size())}};
   while (!tasks.empty()) {
     const auto [node, begin, end] = tasks.back();
     tasks.pop_back();
-    if (end - begin <= kLeafSize) {
-      nodes_[node].first = begin, nodes_[node].count = end - begin;
-      for (uint32_t i = begin; i < end; ++i) {
-        slot_of_[items[i].light] = i, leaf_of_[items[i].light] = node;
-        bounds[node] = merge(bounds[node], items[i].bounds);
-      }
-      continue;
+    std::vector<Part> parts{part(begin, end)};
+    while (parts.size() < kWidth) {
+      Part& widest = *std::max_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.cost < b.cost; });
+      if (widest.end - widest.begin < 2) break;
+      const Part whole = widest;
+      const uint32_t middle = whole.begin + split({items.data() + whole.begin, whole.end - whole.begin});
+      widest = part(whole.begin, middle);
+      parts.push_back(part(middle, whole.end));
     }
-    const uint32_t middle = split({items.data() + begin, end - begin}) + begin, child = uint32_t(nodes_.size());
-    nodes_[node].first = child;
-    nodes_.resize(nodes_.size() + 2), bounds.resize(nodes_.size());
-    nodes_[child].parent = nodes_[child + 1].parent = node;
-    tasks.push_back({child, begin, middle});
-    tasks.push_back({child + 1, middle, end});
+    for (uint32_t slot = 0; slot < parts.size(); ++slot) {
+      const Part& p = parts[slot];
+      if (p.end - p.begin == 1) {
+        const Item& item = items[p.begin];
+        nodes_[node].child[slot] = item.light | kLightBit;
+        place_of_[item.light] = {node, slot};
+        bounds[kWidth * node + slot] = item.bounds;
+        continue;
+      }
+      const uint32_t child = uint32_t(nodes_.size());
+      nodes_.emplace_back(), bounds.resize(kWidth * nodes_.size());
+      nodes_[node].child[slot] = child, nodes_[child].parent = node, nodes_[child].slot = slot;
+      tasks.push_back({child, p.begin, p.end});
+    }
   }
-  // Children come after their parents.
   for (size_t i = nodes_.size(); i-- > 0;) {
-    Node& n = nodes_[i];
-    if (n.count == 0) bounds[i] = merge(bounds[n.first], bounds[n.first + 1]);
-    n.cluster = LightCluster(bounds[i]);
+    LightBounds all;
+    for (uint32_t k = 0; k < kWidth; ++k) {
+      const LightBounds& b = bounds[kWidth * i + k];
+      if (b.power > 0.0f) nodes_[i].set(k, b), all = merge(all, b);
+    }
+    if (i > 0) bounds[kWidth * nodes_[i].parent + nodes_[i].slot] = all;
   }
 }
 
 uint32_t LightTree::split(std::span<Item> items) {
   constexpr int kBins = 12;
+  constexpr size_t kFew = 8;  // too few for the heuristic to be worth its time
   Bounds centers, box;
   for (const Item& item : items) centers.add(item.center), box.add(item.bounds.box());
   const Vec3 extent = centers.extent(), size = box.extent();
@@ -168,6 +192,12 @@ uint32_t LightTree::split(std::span<Item> items) {
   const auto bin_of = [&](const Item& item, int axis) {
     return std::clamp(int((item.center[axis] - centers.lo[axis]) * scale[axis]), 0, kBins - 1);
   };
+  if (items.size() <= kFew) {
+    const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+    const auto middle = items.begin() + std::ptrdiff_t(items.size() / 2);
+    std::nth_element(items.begin(), middle, items.end(), [axis](const Item& a, const Item& b) { return a.center[axis] < b.center[axis]; });
+    return uint32_t(items.size() / 2);
+  }
   Bin bins[3][kBins];
   for (const Item& item : items) {
     for (int axis = 0; axis < 3; ++axis) bins[axis][bin_of(item, axis)].add(item.bounds);
@@ -198,50 +228,41 @@ uint32_t LightTree::split(std::span<Item> items) {
   return uint32_t(middle - items.begin());
 }
 
-std::optional<LightTree::Pick> LightTree::sample(const LightQuery& query, float u) const {
+std::optional<LightTree::Pick> LightTree::sample(const LightQuery& query, const Importance& root, float u) const {
   if (empty()) return std::nullopt;
   float probability = 1.0f;
-  const Node* node = &nodes_[0];
-  while (node->count == 0) {
-    const Node* child = &nodes_[node->first];
-    const float left = light_importance(child[0].cluster, query), right = light_importance(child[1].cluster, query);
-    if (!(left + right > 0.0f)) return std::nullopt;
-    const float p = left / (left + right);
-    const bool go_left = u < p;
-    probability *= go_left ? p : right / (left + right);
-    u = go_left ? u / p : (u - p) / (1.0f - p);
-    u = std::min(std::max(u, 0.0f), kOneMinusEpsilon);
-    node = child + (go_left ? 0 : 1);
+  Importance weights = root;
+  for (uint32_t node = 0;;) {
+    const float sum = weights.sum();
+    if (!(sum > 0.0f)) return std::nullopt;
+    float x = u * sum;
+    uint32_t chosen = kWidth;
+    for (uint32_t k = 0; k < kWidth; ++k) {
+      if (weights.of[k] == 0.0f) continue;
+      if (chosen < kWidth) x -= weights.of[chosen];
+      chosen = k;
+      if (x < weights.of[k]) break;
+    }
+    const float weight = weights.of[chosen];
+    probability *= weight / sum;
+    u = std::min(std::max(x / weight, 0.0f), kOneMinusEpsilon);
+    node = nodes_[node].child[chosen];
+    if (node & kLightBit) return Pick{node & ~kLightBit, probability};
+    weights = importance(nodes_[node], query);
   }
-  float weights[kLeafSize], sum = 0;
-  for (uint32_t i = 0; i < node->count; ++i) sum += weights[i] = light_importance(slots_[node->first + i], query);
-  if (!(sum > 0.0f)) return std::nullopt;
-  float x = u * sum;
-  uint32_t last = 0;
-  for (uint32_t i = 0; i < node->count; ++i) {
-    if (weights[i] == 0.0f) continue;
-    last = i;
-    if (x < weights[i]) break;
-    x -= weights[i];
-  }
-  return Pick{order_[node->first + last], probability * weights[last] / sum};
 }
 
-float LightTree::probability(const LightQuery& query, uint32_t light) const {
-  uint32_t index = leaf_of_[light];
-  const Node& leaf = nodes_[index];
-  float sum = 0;
-  for (uint32_t i = 0; i < leaf.count; ++i) sum += light_importance(slots_[leaf.first + i], query);
-  if (!(sum > 0.0f)) return 0.0f;
-  float p = light_importance(slots_[slot_of_[light]], query) / sum;
-  while (index != 0 && p > 0.0f) {
-    const uint32_t sibling = index & 1u ? index + 1 : index - 1;
-    const float mine = light_importance(nodes_[index].cluster, query), other = light_importance(nodes_[sibling].cluster, query);
+float LightTree::probability(const LightQuery& query, const Importance& root, uint32_t light) const {
+  auto [node, slot] = place_of_[light];
+  float p = 1.0f;
+  while (true) {
+    const Importance weights = node == 0 ? root : importance(nodes_[node], query);
+    const float mine = weights.of[slot];
     if (!(mine > 0.0f)) return 0.0f;
-    p *= mine / (mine + other);
-    index = nodes_[index].parent;
+    p *= mine / weights.sum();
+    if (node == 0) return p;
+    slot = nodes_[node].slot, node = nodes_[node].parent;
   }
-  return p;
 }
 
 }  // namespace gi

@@ -22,65 +22,52 @@ struct LightBounds {
 
 LightBounds merge(const LightBounds& a, const LightBounds& b);
 
-// The same, as the choice wants it.
-struct LightCluster {
-  Vec3 center;
-  float radius2 = 0;
-  Vec3 axis{0, 0, 1};
-  float power = 0;
-  float cos_normals = 1, sin_normals = 0, cos_emission = 0;
-  bool two_sided = false;
-
-  LightCluster() = default;
-  explicit LightCluster(const LightBounds& b)
-      : center((b.lo + b.hi) * 0.5f),
-        radius2(0.25f * length_squared(b.hi - b.lo)),
-        axis(b.axis),
-        power(b.power),
-        cos_normals(b.cos_normals),
-        sin_normals(safe_sqrt(1.0f - b.cos_normals * b.cos_normals)),
-        cos_emission(b.cos_emission),
-        two_sided(b.two_sided) {}
-};
-// An upper estimate of the irradiance from the cluster; 0 only if there can be none.
-float light_importance(const LightCluster& cluster, const LightQuery& query);
-
 class LightTree {
  public:
   struct Pick {
     uint32_t light;
     float probability;
   };
+  // Upper estimates of the irradiance from each of a node's children; 0 only if there can be none.
+  struct Importance {
+    float of[4] = {0, 0, 0, 0};
+    float sum() const { return (of[0] + of[1]) + (of[2] + of[3]); }
+  };
 
   LightTree() = default;
   explicit LightTree(const std::vector<LightBounds>& lights);
 
   bool empty() const { return nodes_.empty(); }
-  float importance(const LightQuery& query) const { return empty() ? 0.0f : light_importance(nodes_[0].cluster, query); }
-  std::optional<Pick> sample(const LightQuery& query, float u) const;
-  float probability(const LightQuery& query, uint32_t light) const;
-  size_t memory_bytes() const { return nodes_.size() * sizeof(Node) + slots_.size() * sizeof(LightCluster) + order_.size() * 12; }
+  // Of all there is: what `sample` and `probability` begin with.
+  Importance root(const LightQuery& query) const { return empty() ? Importance() : importance(nodes_[0], query); }
+  std::optional<Pick> sample(const LightQuery& query, const Importance& root, float u) const;
+  float probability(const LightQuery& query, const Importance& root, uint32_t light) const;
+  size_t memory_bytes() const { return nodes_.size() * sizeof(Node) + place_of_.size() * sizeof(Place); }
 
  private:
-  static constexpr uint32_t kLeafSize = 8;
+  static constexpr uint32_t kWidth = 4, kLightBit = 0x80000000u;
+  // Four children side by side, so that their importances are worked out together.
   struct alignas(64) Node {
-    LightCluster cluster;
-    uint32_t first = 0;  // of the two children, or of the leaf's lights
-    uint32_t count = 0;  // lights in the leaf; 0: inner node
-    uint32_t parent = 0;
+    float center_x[kWidth] = {}, center_y[kWidth] = {}, center_z[kWidth] = {}, radius2[kWidth] = {};
+    float axis_x[kWidth] = {}, axis_y[kWidth] = {}, axis_z[kWidth] = {}, power[kWidth] = {};  // power 0: no child
+    float cos_normals[kWidth] = {}, sin_normals[kWidth] = {}, cos_emission[kWidth] = {}, sides[kWidth] = {};
+    uint32_t child[kWidth] = {};  // another node, or a light with kLightBit
+    uint32_t parent = 0, slot = 0;
+    void set(uint32_t k, const LightBounds& bounds);
+  };
+  struct Place {
+    uint32_t node, slot;
   };
   struct Item {
     LightBounds bounds;
     Vec3 center;
     uint32_t light;
   };
-  void build(std::vector<Item>& items);
+  static Importance importance(const Node& node, const LightQuery& query);
   static uint32_t split(std::span<Item> items);  // puts them in order; how many go left
 
-  std::vector<Node> nodes_;           // siblings are neighbours
-  std::vector<LightCluster> slots_;   // lights in the order of the leaves
-  std::vector<uint32_t> order_;       // light of each slot
-  std::vector<uint32_t> slot_of_, leaf_of_;  // of each light
+  std::vector<Node> nodes_;      // children after their parents
+  std::vector<Place> place_of_;  // of each light
 };
 
 }  // namespace gi

@@ -112,8 +112,7 @@ struct LightSet::Impl {
 
   // The share of all samples that goes to lights without a place: by irradiance, but never less than a sixth of either
   // kind, since neither knows what is in the way.
-  float local_share(const LightQuery& query, float far) const {
-    const float local = tree.importance(query);
+  static float local_share(float local, float far) {
     if (!(local > 0.0f)) return 0.0f;
     if (!(far > 0.0f)) return 1.0f;
     constexpr float kLeast = 1.0f / 6.0f;
@@ -133,9 +132,10 @@ struct LightSet::Impl {
   }
 
   std::optional<LightTree::Pick> pick(const LightQuery& query, float u) const {
-    const float far = far_weight(query), local = local_share(query, far);
+    const LightTree::Importance root = tree.root(query);
+    const float far = far_weight(query), local = local_share(root.sum(), far);
     if (u < local) {
-      auto p = tree.sample(query, std::min(u / local, kOneMinusEpsilon));
+      const auto p = tree.sample(query, root, std::min(u / local, kOneMinusEpsilon));
       if (!p) return std::nullopt;
       return LightTree::Pick{tree_light[p->light], p->probability * local};
     }
@@ -153,9 +153,10 @@ struct LightSet::Impl {
   }
 
   float pick_probability(const LightQuery& query, uint32_t light) const {
-    const float far = far_weight(query), local = local_share(query, far);
+    const LightTree::Importance root = tree.root(query);
+    const float far = far_weight(query), local = local_share(root.sum(), far);
     if (light < tree_slot.size() && tree_slot[light] != kNoId) {
-      return local > 0.0f ? local * tree.probability(query, tree_slot[light]) : 0.0f;
+      return local > 0.0f ? local * tree.probability(query, root, tree_slot[light]) : 0.0f;
     }
     if (!(far > 0.0f)) return 0.0f;
     if (light == world_light()) return (1.0f - local) * world.irradiance() / far;
