@@ -153,6 +153,17 @@ class Film:
 
 
 @dataclass
+class Lightmap:
+    """A bake: the film lies over an object's surface, as a UV map says."""
+
+    object: str  # name of the Instance
+    uv_map: str
+    content: str = (
+        "IRRADIANCE"  # IRRADIANCE or INDIRECT, over pi: what a white surface shows; RADIOSITY: what it does show
+    )
+
+
+@dataclass
 class Scene:
     meshes: list[Mesh] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)

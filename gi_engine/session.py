@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import native
-from .scene_data import Scene, Settings
+from .scene_data import Lightmap, Scene, Settings
 
 POLL_SECONDS = 0.05  # how soon a cancel is seen
 
@@ -17,10 +17,10 @@ class RenderFailed(RuntimeError):
 class Session:
     """Owns the native scene and session. Use as a context manager: leaving it stops the threads."""
 
-    def __init__(self, scene: Scene, settings: Settings):
+    def __init__(self, scene: Scene, settings: Settings, lightmap: Lightmap | None = None):
         try:
             self.native_scene = native.build_scene(scene, settings.threads)
-            self.native = native.module().Session(self.native_scene, scene.camera, scene.film, settings)
+            self.native = native.module().Session(self.native_scene, scene.camera, scene.film, settings, lightmap)
         except native.NativeMissing:
             raise
         except (ValueError, RuntimeError) as error:  # bad input, a library that fails

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..scene_data import Scene, Settings
+import numpy as np
+
+from ..scene_data import Camera, Scene, Settings
 from .camera import export_camera
 from .film import export_film, frame_size
 from .images import release_scratch
@@ -31,16 +33,22 @@ class ExportError(ValueError):
     """The scene cannot be rendered; the message is for the user."""
 
 
-def export(depsgraph, descriptors: list[dict], engine=None, size=None, integrator: str | None = None) -> Exported:
+def export(
+    depsgraph, descriptors: list[dict], engine=None, size=None, integrator: str | None = None, lightmap: str = ""
+) -> Exported:
     """`descriptors`: the integrators'. `engine`: the RenderEngine, where there is one (stereo, camera override).
 
     `size` is the full frame's in pixels; by default the scene's. `integrator` overrides the scene's.
+    `lightmap`: the UV map that a bake is for; it needs no camera.
     """
     warnings = Warnings()
     scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer_eval
     width, height = size or frame_size(scene.render)
     out = Scene()
-    out.camera = export_active_camera(engine, depsgraph, width, height, warnings)
+    if lightmap and not scene.camera:
+        out.camera = Camera("none", "ORTHO", np.eye(4, dtype=np.float32))
+    else:
+        out.camera = export_active_camera(engine, depsgraph, width, height, warnings)
     out.film = export_film(scene, view_layer, resolve(scene, view_layer), (width, height))
     found = collect(depsgraph, warnings)
     shaders = Shaders(out, depsgraph, warnings)
@@ -48,7 +56,7 @@ def export(depsgraph, descriptors: list[dict], engine=None, size=None, integrato
     out.world = export_world(world, shaders.world(world) if world else -1)
     export_lights(out, found, shaders, warnings)
     if view_layer.use_solid:
-        export_objects(out, found, shaders, warnings)
+        export_objects(out, found, shaders, warnings, {lightmap} - {""})
     if scene.render.use_motion_blur:
         warnings.add("motion blur is not supported yet; rendered without")
     release_scratch()
@@ -76,10 +84,10 @@ def export_lights(out: Scene, found: Collected, shaders: Shaders, warnings: Warn
                 warnings.add("the area light has no size and gives no light", name)
 
 
-def export_objects(out: Scene, found: Collected, shaders: Shaders, warnings: Warnings) -> None:
+def export_objects(out: Scene, found: Collected, shaders: Shaders, warnings: Warnings, attributes: set[str]) -> None:
     # Programs first: they say which attributes the meshes have to bring.
     slots = [shaders.slots(prototype.materials) for prototype in found.prototypes]
-    wanted = shaders.wanted_attributes()
+    wanted = shaders.wanted_attributes() | attributes
     if "UV" in out.film.passes:
         wanted.add("")
     index_of: dict[int, int | None] = {}

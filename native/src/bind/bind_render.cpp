@@ -89,6 +89,15 @@ nb::ndarray<nb::numpy, float> read_pass(const Session& session, const std::strin
   return nb::ndarray<nb::numpy, float>(pixels->data(), {h, w, c}, owner);
 }
 
+nb::ndarray<nb::numpy, float> coverage(const Session& session) {
+  require(session.lightmap(), "the session is not a bake");
+  const size_t h = size_t(session.film().spec().height), w = size_t(session.film().spec().width);
+  auto* texels = new std::vector<float>(h * w);
+  nb::capsule owner(texels, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+  for (size_t i = 0; i < h * w; ++i) (*texels)[i] = session.lightmap()->coverage(int(i % w), int(i / w));
+  return nb::ndarray<nb::numpy, float>(texels->data(), {h, w}, owner);
+}
+
 nb::list describe_integrators() {
   nb::list all;
   for (const Descriptor& d : integrators()) {
@@ -110,7 +119,7 @@ nb::list describe_integrators() {
       parameters.append(q);
     }
     nb::dict entry;
-    entry["id"] = d.id, entry["label"] = d.label, entry["blurb"] = d.blurb, entry["parameters"] = parameters;
+    entry["id"] = d.id, entry["label"] = d.label, entry["blurb"] = d.blurb, entry["parameters"] = parameters, entry["bakes"] = d.bakes;
     all.append(entry);
   }
   return all;
@@ -154,15 +163,26 @@ void bind_render(nb::module_& m) {
   nb::class_<Session>(m, "Session", "One render in the background.")
       .def(
           "__init__",
-          [](Session* self, const BoundScene& scene, nb::handle camera, nb::handle film, nb::handle settings) {
-            new (self) Session(*scene.scene, read_camera(camera), read_film(film), read_settings(settings));
+          [](Session* self, const BoundScene& scene, nb::handle camera, nb::handle film, nb::handle settings, nb::handle lightmap) {
+            new (self) Session(*scene.scene, read_camera(camera), read_film(film), read_settings(settings), read_lightmap(lightmap));
           },
-          nb::arg("scene"), nb::arg("camera"), nb::arg("film"), nb::arg("settings"), nb::keep_alive<1, 2>(),
-          "Takes scene_data's Camera, Film and Settings. Raises ValueError for bad input.")
+          nb::arg("scene"), nb::arg("camera"), nb::arg("film"), nb::arg("settings"), nb::arg("lightmap") = nb::none(),
+          nb::keep_alive<1, 2>(), "Takes scene_data's Camera, Film, Settings and, for a bake, Lightmap. Raises ValueError for bad input.")
       .def("start", &Session::start)
       .def("wait", &Session::wait, nb::arg("seconds"), nb::call_guard<nb::gil_scoped_release>(), "True once the render has ended.")
       .def("cancel", &Session::cancel)
       .def("progress", &progress_dict)
+      .def(
+          "messages", [](const Session& s) { return s.log().texts(); }, "What the integrator has to say of the scene, for the user.")
+      .def(
+          "figures",
+          [](const Session& s) {
+            nb::dict d;
+            for (const auto& [name, value] : s.log().figures()) d[name.c_str()] = value;
+            return d;
+          },
+          "What the integrator measured so far, by name.")
+      .def("coverage", &coverage, "Of a bake: share of each texel that the surface covers, (height, width) float32.")
       .def("read", &read_pass, nb::arg("render_pass"), "The pass so far: (height, width, channels) float32, row 0 at the bottom.");
 
   m.def("integrators", &describe_integrators, "Descriptors of the integrators and their parameters.");

@@ -295,4 +295,14 @@ RenderSettings read_settings(nb::handle settings) {
   return s;
 }
 
+std::optional<LightmapSpec> read_lightmap(nb::handle lightmap) {
+  if (lightmap.is_none()) return {};
+  const Record r{nb::borrow(lightmap), "the lightmap"};
+  LightmapSpec s{r.get<std::string>("object"), r.get<std::string>("uv_map")};
+  s.content = r.choice<LightmapContent>(
+      "content",
+      {{"IRRADIANCE", LightmapContent::kIrradiance}, {"INDIRECT", LightmapContent::kIndirect}, {"RADIOSITY", LightmapContent::kRadiosity}});
+  return s;
+}
+
 }  // namespace gi::bind

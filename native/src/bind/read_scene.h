@@ -13,5 +13,6 @@ SceneData read_scene(nanobind::handle scene);
 Camera read_camera(nanobind::handle camera);
 FilmSpec read_film(nanobind::handle film);
 RenderSettings read_settings(nanobind::handle settings);
+std::optional<LightmapSpec> read_lightmap(nanobind::handle lightmap);  // None: none
 
 }  // namespace gi::bind

@@ -56,6 +56,7 @@ struct Descriptor {
   const char* blurb;
   std::vector<Parameter> parameters;
   std::unique_ptr<Integrator> (*create)(const Parameters&);
+  bool bakes = false;  // whether its paths from the eye may begin on a surface: heeds RenderContext::lightmap
 };
 
 const std::vector<Descriptor>& integrators();

@@ -85,8 +85,9 @@ class PathIntegrator final : public Integrator {
     bool may_scatter = true;  // false past the bounce limit: the next surface only emits
     float least_pdf = kInf;   // of the directions so far, per steradian
 
+    const int first_depth = context.lightmap ? context.lightmap->first_depth() : 0;
     const auto add = [&](Rgb radiance, int depth) {
-      if (is_black(radiance)) return;
+      if (is_black(radiance) || depth < first_depth) return;
       result.radiance += clamp_contribution(path.throughput * radiance, depth > 1 ? s_.clamp_indirect : s_.clamp_direct);
     };
 
@@ -223,7 +224,8 @@ const Descriptor& path_descriptor() {
           {"filter_glossy", "Filter Glossy", Kind::kFloat, 0, 0, 100,
            "Makes glossy surfaces rougher where unlikely paths see them: less noise, blurred caustics. 0 is off"},
       },
-      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<PathIntegrator>(p); }};
+      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<PathIntegrator>(p); },
+      true};
   return descriptor;
 }
 

@@ -12,13 +12,18 @@ double now() { return std::chrono::duration<double>(std::chrono::steady_clock::n
 
 }  // namespace
 
-Session::Session(const Scene& scene, const Camera& camera, FilmSpec film, RenderSettings settings)
+Session::Session(const Scene& scene, const Camera& camera, FilmSpec film, RenderSettings settings,
+                 const std::optional<LightmapSpec>& lightmap)
     : scene_(scene), camera_(camera), film_(std::move(film)), settings_(std::move(settings)) {
   require(settings_.samples >= 0 && settings_.time_limit >= 0 && settings_.noise_target >= 0,
           "samples, time limit and noise target must not be negative");
   require(settings_.samples > 0 || settings_.time_limit > 0 || settings_.noise_target > 0,
           "0 samples and neither a time limit nor a noise target: there is nothing to render");
   const Descriptor& d = find_integrator(settings_.integrator);
+  if (lightmap) {
+    require(d.bakes, "integrator '" + settings_.integrator + "' cannot bake lightmaps");
+    lightmap_ = std::make_unique<const Lightmap>(scene, *lightmap, film_.spec().width, film_.spec().height);
+  }
   integrator_ = d.create(Parameters(d.parameters, settings_.parameters, d.id));
 }
 
@@ -50,7 +55,7 @@ void Session::run() {
     ThreadPool pool(settings_.threads);
     scene_.resources().camera = &camera_;
     const LightSet lights(scene_);
-    const RenderContext context{scene_, lights, camera_, pool, settings_.seed, cancelled_, tiles_done_};
+    const RenderContext context{scene_, lights, camera_, pool, settings_.seed, cancelled_, tiles_done_, log_, lightmap_.get()};
     integrator_->prepare(context);
     const double start = now();
     float noise = kInf;

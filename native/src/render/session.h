@@ -36,13 +36,17 @@ struct Progress {
 class Session {
  public:
   // The scene must outlive the session. Throws InputError.
-  Session(const Scene& scene, const Camera& camera, FilmSpec film, RenderSettings settings);
+  // With a `lightmap` it is a bake: the film lies over a surface.
+  Session(const Scene& scene, const Camera& camera, FilmSpec film, RenderSettings settings,
+          const std::optional<LightmapSpec>& lightmap = {});
   ~Session();  // cancels and waits
   void start();
   bool wait(double seconds);  // true once it has ended
   void cancel();
   Progress progress() const;
   const Film& film() const { return film_; }
+  const Log& log() const { return log_; }
+  const Lightmap* lightmap() const { return lightmap_.get(); }
 
  private:
   void run();
@@ -51,10 +55,12 @@ class Session {
   const Scene& scene_;
   Camera camera_;
   Film film_;
+  std::unique_ptr<const Lightmap> lightmap_;
   RenderSettings settings_;
   std::unique_ptr<Integrator> integrator_;
   std::atomic<bool> cancelled_{false};
   std::atomic<int> tiles_done_{0};
+  Log log_;
   std::thread thread_;
   mutable std::mutex mutex_;
   std::condition_variable ended_;

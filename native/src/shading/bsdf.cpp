@@ -81,6 +81,23 @@ void Bsdf::blur(float alpha) {
   }
 }
 
+void Bsdf::choose(uint8_t kinds, Vec3 wo) {
+  chosen_ = kinds, flags_ = 0;
+  float sum = select_transparent_ = kinds & kSpecular ? std::max(average(transparency), 0.0f) : 0.0f;
+  for (int i = 0; i < count_; ++i) {
+    Entry& e = entries_[i];
+    e.select = 0.0f;
+    if (!(e.flags & kinds & kKinds)) continue;
+    if (e.albedo < 0.0f) e.albedo = average(e.weight * albedo_of(e.lobe, e.frame.to_local(wo)));
+    sum += e.select = std::max(kLeastShare * average(e.weight), e.albedo);
+    flags_ |= e.flags;
+  }
+  if (select_transparent_ > 0.0f) flags_ |= kTransparent;
+  const float scale = sum > 0.0f ? 1.0f / sum : 0.0f;
+  select_transparent_ *= scale;
+  for (int i = 0; i < count_; ++i) entries_[i].select *= scale;
+}
+
 void Bsdf::hold_out() {
   count_ = 0;
   emission = Rgb(), holdout = Rgb(1.0f) - transparency;
@@ -105,7 +122,7 @@ template <class Accept>
 LobeEval Bsdf::eval_if(Vec3 wo, Vec3 wi, const Entry* skipped, Accept accept) const {
   LobeEval sum;
   for (const Entry& e : *this) {
-    if (&e == skipped || (e.flags & kSpecular)) continue;
+    if (&e == skipped || (e.flags & kSpecular) || !(e.flags & chosen_)) continue;
     const float cos_i = dot(e.frame.z, wi);
     if (!(e.flags & (cos_i < 0.0f ? kTransmission : kReflection))) continue;
     const float s = shadowing(e, wi, cos_i, false);
@@ -189,6 +206,13 @@ Rgb Bsdf::diffuse_albedo() const {
   Rgb sum;
   for (const Entry& e : *this)
     if (e.flags & kDiffuse) sum += e.weight;
+  return sum;
+}
+
+Rgb Bsdf::diffuse_albedo(Vec3 wo, uint8_t side) const {
+  Rgb sum;
+  for (const Entry& e : *this)
+    if ((e.flags & kDiffuse) && (e.flags & side)) sum += e.weight * albedo_of(e.lobe, e.frame.to_local(wo));
   return sum;
 }
 

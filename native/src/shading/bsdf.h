@@ -28,7 +28,8 @@ class Bsdf {
   Bsdf() {}  // entries_ stay uninitialised
   // `without`: CausticFlags, sides of glossy lobes to leave out.
   void clear(Vec3 ng, Vec3 ns, uint8_t without = 0) {
-    count_ = 0, flags_ = 0, ng_ = ng, ns_ = ns, without_ = without, emission = Rgb(), transparency = Rgb(), holdout = Rgb();
+    count_ = 0, flags_ = 0, chosen_ = kDiffuse | kGlossy | kSpecular, ng_ = ng, ns_ = ns, without_ = without, emission = Rgb(),
+    transparency = Rgb(), holdout = Rgb();
   }
   uint8_t without() const { return without_; }
   void set_geometric_normal(Vec3 ng) { ng_ = ng; }
@@ -57,6 +58,9 @@ class Bsdf {
 
   // Makes glossy and specular lobes at least as rough as `alpha`; diffuse ones stay as they are. After finish().
   void blur(float alpha);
+  // Lobes of other kinds than `kinds` (kDiffuse, kGlossy, kSpecular) are neither evaluated nor sampled from now on; transparency
+  // goes with kSpecular. After finish(), any number of times.
+  void choose(uint8_t kinds, Vec3 wo);
   // Turns the whole surface, but for what it lets through, into a hole of the picture. After finish().
   void hold_out();
 
@@ -72,6 +76,7 @@ class Bsdf {
   Rgb albedo(Vec3 wo) const;        // directional albedo, transparency left out
   Rgb albedo(Vec3 wo, uint8_t flags) const;  // only of lobes with a kind (kDiffuse, kGlossy, kSpecular) in `flags`
   Rgb diffuse_albedo() const;       // Σ weights of the diffuse lobes
+  Rgb diffuse_albedo(Vec3 wo, uint8_t side) const;  // directional, of those that reflect or those that transmit
   Vec3 mean_normal() const;         // albedo-weighted shading normal (Normal pass, denoising)
   uint8_t flags() const { return flags_; }
   bool is_delta() const { return (flags_ & (kDiffuse | kGlossy)) == 0; }  // nothing for light sampling to do
@@ -105,7 +110,7 @@ class Bsdf {
     Entry entries_[kMaxLobes];
   };
   int count_ = 0;
-  uint8_t flags_ = 0, without_ = 0;
+  uint8_t flags_ = 0, without_ = 0, chosen_ = kDiffuse | kGlossy | kSpecular;
   float select_transparent_ = 0;
   float terminator_ = 1;
   bool correct_bumps_ = true;

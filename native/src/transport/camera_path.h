@@ -27,9 +27,14 @@ void for_each_pixel(const RenderContext& context, int pass, Film& film, const F&
         const Vec2 offset = film.filter().sample(sampler.next_2d());
         const Vec2 lens = sampler.next_2d();
         const Vec2 at{(float(px) + 0.5f + offset.x) * pixel.x, (float(py) + 0.5f + offset.y) * pixel.y};
-        rays[i] = context.camera.sample(at, pixel, lens);
+        if (!context.lightmap)
+          rays[i] = context.camera.sample(at, pixel, lens);
+        else if (context.lightmap->covers(px, py))
+          rays[i] = context.lightmap->sample(px, py, lens, sampler.next_2d());
       }
-      for (int i = 0; i < width; ++i) f(rays[i], samplers[i], samples[i]);
+      for (int i = 0; i < width; ++i) {
+        if (!context.lightmap || context.lightmap->covers(spec.x0 + tile.x0 + i, spec.y0 + y)) f(rays[i], samplers[i], samples[i]);
+      }
       film.add_row(index, y, pass, samples);
     }
     ++context.tiles_done;
@@ -78,6 +83,7 @@ struct CameraPath {
                       PixelSample& sample) const {
     ShadingPoint point = context.scene.shading_point(ray, hit, state, camera.footprint + camera.spread * (travelled + hit.t));
     context.scene.shade(point, bsdf);
+    if (context.lightmap && state.depth == 0) context.lightmap->adapt(bsdf, point.wo, point.ng, point.ns);
     if (state.depth == 0 && film.has_data_passes()) record_surface(context, point, bsdf, sample);
     if (seen_from_camera) {
       if (context.scene.instances()[point.instance].data->holdout) bsdf.hold_out();

@@ -1,13 +1,45 @@
 // What everything that follows light is given: the scene, its lights, the camera, threads. Leaves out the film.
 #pragma once
 #include <atomic>
+#include <mutex>
+#include <string>
+#include <vector>
 
 #include "core/parallel.h"
 #include "lights/lights.h"
 #include "scene/camera.h"
 #include "scene/scene.h"
+#include "transport/lightmap.h"
 
 namespace gi {
+
+// What the user should be told of a render: texts, and figures by name. Any thread.
+class Log {
+ public:
+  void say(std::string text) {
+    const std::lock_guard lock(mutex_);
+    texts_.push_back(std::move(text));
+  }
+  void set(const std::string& figure, double value) {
+    const std::lock_guard lock(mutex_);
+    for (auto& [name, old] : figures_)
+      if (name == figure) return void(old = value);
+    figures_.emplace_back(figure, value);
+  }
+  std::vector<std::string> texts() const {
+    const std::lock_guard lock(mutex_);
+    return texts_;
+  }
+  std::vector<std::pair<std::string, double>> figures() const {
+    const std::lock_guard lock(mutex_);
+    return figures_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<std::string> texts_;
+  std::vector<std::pair<std::string, double>> figures_;
+};
 
 struct RenderContext {
   const Scene& scene;
@@ -17,6 +49,8 @@ struct RenderContext {
   uint32_t seed = 0;
   const std::atomic<bool>& cancelled;
   std::atomic<int>& tiles_done;  // of the pass under way
+  Log& log;
+  const Lightmap* lightmap = nullptr;  // in a bake: takes the camera's place
 };
 
 }  // namespace gi

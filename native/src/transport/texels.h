@@ -1,0 +1,70 @@
+// Power gathered on the surfaces of a scene, and read back as power per area: a lattice of nodes for each instance, each side of its
+// surfaces apart. Order and number of threads do not matter to the sums. Knows nothing of what is gathered.
+#pragma once
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/parallel.h"
+#include "transport/texel_lattice.h"
+
+namespace gi {
+
+class Texels {
+ public:
+  // `size`: the wished edge of a texel in metres; made larger until everything fits into `memory` bytes. Stops early, useless,
+  // when `cancelled`.
+  Texels(const Scene& scene, double size, size_t memory, ThreadPool& pool, const std::atomic<bool>& cancelled);
+  ~Texels();
+
+  // Forgets what was gathered. `largest`: a power that no deposit and no sum of a node will be far above.
+  void clear(double largest);
+  // Any thread. `back`: the side that the triangle's normal points away from. The share of each node near the point is by its hat.
+  void deposit(const ShadingPoint& point, bool back, Rgb power);
+  Rgb density(const ShadingPoint& point, bool back) const;  // per square metre
+
+  double size() const { return size_; }
+  size_t node_count() const;
+  size_t memory_bytes() const;
+  std::string description() const;
+
+ private:
+  struct Sum {
+    std::atomic<int64_t> channel[3];
+  };
+  struct Side {
+    Sum* sums = nullptr;  // of its lattice's nodes
+    // Small triangles that something stands on or cuts: there nodes count only for the points that see them. One bit each; empty
+    // if there are none, and then `area` is, too.
+    std::vector<uint32_t> split;
+    std::vector<float> area;
+    std::atomic<bool> touched{false};
+    Side() = default;
+    Side(Side&& o) noexcept : sums(o.sums), split(std::move(o.split)), area(std::move(o.area)) {}
+  };
+  struct Place {
+    std::shared_ptr<const TexelLattice> lattice;
+    float area_scale = 1;  // of this instance, over the one that the lattice was made for
+    Side side[2];
+  };
+
+  double bytes_at(double size) const;
+  void place_lattices();
+  void find_splits(ThreadPool& pool, const std::atomic<bool>& cancelled);
+  void test_triangle(uint32_t instance, uint32_t triangle, bool back, std::vector<uint32_t>& found) const;
+  void measure_split(uint32_t instance, bool back, uint32_t triangle, uint32_t cell, int samples,
+                     std::vector<std::pair<uint32_t, double>>& changes) const;
+  LatticeCell cell_of(const ShadingPoint& point, bool back) const;
+  void weigh_by_sight(uint32_t instance, bool back, Vec3 position, LatticeCell& cell) const;
+
+  const Scene& scene_;
+  double size_;
+  std::vector<Place> places_;
+  std::unique_ptr<Sum, void (*)(void*)> sums_;
+  double unit_ = 0;  // power of one count
+  size_t splits_ = 0;
+  bool split_all_ = true;
+};
+
+}  // namespace gi
