@@ -12,12 +12,14 @@ namespace gi {
 const Descriptor& whitted_descriptor();
 const Descriptor& distributed_descriptor();
 const Descriptor& path_descriptor();
+const Descriptor& particle_descriptor();
 
 const std::vector<Descriptor>& integrators() {
   static const std::vector<Descriptor> all{
       whitted_descriptor(),
       distributed_descriptor(),
       path_descriptor(),
+      particle_descriptor(),
   };
   return all;
 }

@@ -5,8 +5,9 @@
 #include <atomic>
 #include <thread>
 
+#include "core/distribution.h"
 #include "core/sampler.h"
-#include "lights/lamp.h"
+#include "lights/emission.h"
 #include "lights/lamp_bvh.h"
 #include "lights/light_tree.h"
 #include "lights/triangle_light.h"
@@ -34,12 +35,14 @@ struct LightSet::Impl {
   LightTree tree;
   std::vector<uint32_t> tree_light, tree_slot;  // light ↔ index in the tree
   std::vector<uint32_t> suns;
+  SceneBall ball;
+  Distribution1D emitters;  // lights by power
 
   uint32_t first_triangle() const { return uint32_t(lamps.size()); }
   uint32_t world_light() const { return first_triangle() + uint32_t(triangles.size()); }
   uint32_t count() const { return world_light() + (world.emits() ? 1u : 0u); }
 
-  Impl(const Scene& s, int threads) : scene(s) {
+  Impl(const Scene& s, int threads) : scene(s), ball(s.bounds()) {
     add_lamps();
     std::vector<LightBounds> bounds;
     for (uint32_t i = 0; i < lamps.size(); ++i) {
@@ -54,6 +57,17 @@ struct LightSet::Impl {
     for (uint32_t k = 0; k < tree_light.size(); ++k) tree_slot[tree_light[k]] = k;
     tree = LightTree(bounds);
     world = WorldLight(scene, threads);
+    weigh_emitters(bounds);
+  }
+
+  void weigh_emitters(const std::vector<LightBounds>& bounds) {
+    std::vector<float> power;
+    for (const Lamp& lamp : lamps)
+      power.push_back(lamp.strength * std::visit([&](const auto& s) { return gi::emitted_power(s, ball); }, lamp.shape));
+    for (uint32_t k = 0; k < triangles.size(); ++k)
+      power.push_back(kPi * bounds[tree_slot[first_triangle() + k]].power * float(triangles[k].front + triangles[k].back));
+    if (world.emits()) power.push_back(4.0f * world.irradiance() * ball.cross_section());
+    emitters = Distribution1D(power);
   }
 
   void add_lamps() {
@@ -193,7 +207,7 @@ struct LightSet::Impl {
     float sum = 0;
     for (int k = 0; k < kPoints; ++k) {
       const Vec2 u{(float(k) + 0.5f) / kPoints, to_unit_float(reverse_bits(uint32_t(k)))};
-      const auto [place, out] = std::visit([&](const auto& s) { return emit(s, u); }, lamp.shape);
+      const auto [place, out] = std::visit([&](const auto& s) { return gi::emit(s, u); }, lamp.shape);
       const bool is_sun = std::holds_alternative<SunLight>(lamp.shape);
       const float m = magnitude(lamp_program(lamp, place + out, -out, is_sun ? kInf : 1.0f, seen_by_light({}, 1.0f)));
       sum += std::isfinite(m) ? m : 0.0f;
@@ -248,6 +262,48 @@ struct LightSet::Impl {
   std::optional<LightSample> sample_light(uint32_t light, const LightQuery& query, Vec2 u) const {
     if (light < first_triangle()) return sample_lamp(light, query, u);
     return light < world_light() ? sample_triangle_light(light, query, u) : sample_world(query, u);
+  }
+
+  // ------------------------------------------------------------ emission
+
+  std::optional<EmittedRay> emit_lamp(uint32_t light, Vec2 u_place, Vec2 u_direction) const {
+    const Lamp& lamp = lamps[light];
+    const ShapeEmission e = std::visit([&](const auto& s) { return gi::emit(s, ball, u_place, u_direction); }, lamp.shape);
+    if (!(e.power > 0.0f)) return std::nullopt;
+    EmittedRay r{{e.origin, e.direction}, lamp.data->color * e.power, light, lamp.data->cast_shadow, lamp.data->visibility};
+    const bool is_sun = std::holds_alternative<SunLight>(lamp.shape);
+    // Programs see the lamp from a metre away: what they make of the distance is not known yet.
+    if (is_sun)
+      r.power *= lamp_program(lamp, ball.center, -e.direction, kInf, seen_by_light({}, kInf));
+    else
+      r.power *= lamp_program(lamp, e.origin + e.direction, -e.direction, 1.0f, seen_by_light({}, 1.0f));
+    return r;
+  }
+
+  std::optional<EmittedRay> emit_triangle(uint32_t light, Vec2 u_place, Vec2 u_direction) const {
+    const TriangleLight& t = triangles[light - first_triangle()];
+    const float sides = float(t.front + t.back);
+    bool back = t.back;
+    if (t.front && t.back) {
+      back = u_direction.x >= 0.5f;
+      u_direction.x = std::min(2.0f * u_direction.x - (back ? 1.0f : 0.0f), kOneMinusEpsilon);
+    }
+    const Vec3 n = back ? -t.normal() : t.normal();
+    const Vec2 b = sample_triangle(u_place);
+    const Vec3 direction = Frame::from_normal(n).to_world(sample_cosine_hemisphere(u_direction));
+    ShadingPoint p = scene.surface_point(t.instance, t.triangle, b.x, b.y, direction, seen_by_light({}, 1.0f));
+    EmittedRay r{{p.position, direction}, Rgb(), light, true, scene.instances()[t.instance].data->visibility};
+    const float scale = std::max({std::abs(p.position.x), std::abs(p.position.y), std::abs(p.position.z), 1e-2f});
+    r.ray.origin = p.position + n * (scale * 4e-6f);
+    r.power = scene.emission(p) * (kPi * t.area() * sides);
+    return r;
+  }
+
+  EmittedRay emit_world(Vec2 u_place, Vec2 u_direction) const {
+    const auto [wi, pdf] = world.sample({}, u_direction);
+    EmittedRay r{{ball.entry(wi, u_place), -wi}, Rgb(), world_light(), true, scene.data().world.visibility};
+    if (pdf > 0.0f) r.power = scene.world_radiance(wi, seen_by_light({}, kInf)) * (ball.cross_section() / pdf);
+    return r;
   }
 
   std::optional<float> meet(uint32_t index, const Ray& ray, uint32_t visibility) const {
@@ -343,6 +399,29 @@ float LightSet::pdf_world(const LightQuery& from, Vec3 direction) const {
   if (!impl_->world.emits() || from.path.depth > impl_->scene.data().world.max_bounces) return 0.0f;
   return impl_->world.pdf_dir(from, direction) * impl_->pick_probability(from, impl_->world_light());
 }
+
+std::optional<EmittedRay> LightSet::emit(float u_choice, Vec2 u_place, Vec2 u_direction) const {
+  if (!(impl_->emitters.total() > 0)) return std::nullopt;
+  const uint32_t light = uint32_t(impl_->emitters.sample(u_choice));
+  auto r = light < impl_->first_triangle() ? impl_->emit_lamp(light, u_place, u_direction)
+           : light < impl_->world_light()  ? impl_->emit_triangle(light, u_place, u_direction)
+                                           : impl_->emit_world(u_place, u_direction);
+  if (!r) return std::nullopt;
+  r->power *= 1.0f / impl_->emitters.probability(light);
+  if (!is_finite(r->power) || is_black(r->power)) return std::nullopt;
+  return r;
+}
+
+bool LightSet::turns_to(const EmittedRay& emitted, Vec3 position) const {
+  if (emitted.light >= impl_->first_triangle()) return true;
+  const Shape& shape = impl_->lamps[emitted.light].shape;
+  const auto* spot = std::get_if<SpotLight>(&shape);
+  const PointLight* point = spot ? &spot->point : std::get_if<PointLight>(&shape);
+  if (!point || point->sphere || !point->has_shape()) return true;
+  return point->intersect({position, -emitted.ray.direction}).has_value();
+}
+
+float LightSet::emitted_power() const { return float(impl_->emitters.total()); }
 
 std::string LightSet::description() const {
   return std::to_string(impl_->lamps.size()) + " lamps, " + std::to_string(impl_->triangles.size()) + " emissive triangles, " +

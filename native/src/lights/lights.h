@@ -38,6 +38,15 @@ struct LampHit {
   uint32_t lamp = 0;
 };
 
+// Light as it leaves a luminaire.
+struct EmittedRay {
+  Ray ray;
+  Rgb power;  // radiance · cos / density: the mean of these is all that the scene's luminaires emit, watts
+  uint32_t light = 0;
+  bool cast_shadow = true;
+  uint32_t visibility = 0xffffffffu;  // RayKind bits: what of a surface the light reaches
+};
+
 class LightSet {
  public:
   explicit LightSet(const Scene& scene, int threads = 0);  // threads for building; 0: one for each core
@@ -67,6 +76,11 @@ class LightSet {
   float pdf_world(const LightQuery& from, Vec3 direction) const;
   // Probability with which `sample` picks the light.
   float pick_probability(const LightQuery& query, uint32_t light) const;
+  // A luminaire chosen by its power, a place on it and a direction: where light starts.
+  std::optional<EmittedRay> emit(float u_choice, Vec2 u_place, Vec2 u_direction) const;
+  // Whether light that was emitted like this is what `position` sees: Blender's lamps of soft falloff turn to whoever looks.
+  bool turns_to(const EmittedRay& emitted, Vec3 position) const;
+  float emitted_power() const;  // of everything, about, |luminance|
   std::string description() const;  // how many of what
 
  private:

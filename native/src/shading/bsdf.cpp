@@ -83,7 +83,7 @@ void Bsdf::blur(float alpha) {
 
 void Bsdf::choose(uint8_t kinds, Vec3 wo) {
   chosen_ = kinds, flags_ = 0;
-  float sum = select_transparent_ = kinds & kSpecular ? std::max(average(transparency), 0.0f) : 0.0f;
+  float sum = select_transparent_ = kinds & kTransparent ? std::max(average(transparency), 0.0f) : 0.0f;
   for (int i = 0; i < count_; ++i) {
     Entry& e = entries_[i];
     e.select = 0.0f;

@@ -28,8 +28,7 @@ class Bsdf {
   Bsdf() {}  // entries_ stay uninitialised
   // `without`: CausticFlags, sides of glossy lobes to leave out.
   void clear(Vec3 ng, Vec3 ns, uint8_t without = 0) {
-    count_ = 0, flags_ = 0, chosen_ = kDiffuse | kGlossy | kSpecular, ng_ = ng, ns_ = ns, without_ = without, emission = Rgb(),
-    transparency = Rgb(), holdout = Rgb();
+    count_ = 0, flags_ = 0, chosen_ = kAll, ng_ = ng, ns_ = ns, without_ = without, emission = Rgb(), transparency = Rgb(), holdout = Rgb();
   }
   uint8_t without() const { return without_; }
   void set_geometric_normal(Vec3 ng) { ng_ = ng; }
@@ -58,8 +57,8 @@ class Bsdf {
 
   // Makes glossy and specular lobes at least as rough as `alpha`; diffuse ones stay as they are. After finish().
   void blur(float alpha);
-  // Lobes of other kinds than `kinds` (kDiffuse, kGlossy, kSpecular) are neither evaluated nor sampled from now on; transparency
-  // goes with kSpecular. After finish(), any number of times.
+  // Lobes of other kinds than `kinds` (kDiffuse, kGlossy, kSpecular, and kTransparent) are neither evaluated nor sampled from now
+  // on. After finish(), any number of times.
   void choose(uint8_t kinds, Vec3 wo);
   // Turns the whole surface, but for what it lets through, into a hole of the picture. After finish().
   void hold_out();
@@ -109,8 +108,9 @@ class Bsdf {
   union {
     Entry entries_[kMaxLobes];
   };
+  static constexpr uint8_t kAll = kDiffuse | kGlossy | kSpecular | kTransparent;
   int count_ = 0;
-  uint8_t flags_ = 0, without_ = 0, chosen_ = kDiffuse | kGlossy | kSpecular;
+  uint8_t flags_ = 0, without_ = 0, chosen_ = kAll;
   float select_transparent_ = 0;
   float terminator_ = 1;
   bool correct_bumps_ = true;

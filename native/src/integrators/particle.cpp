@@ -1,0 +1,342 @@
+// Particle tracing: light is carried from the luminaires by particles that are absorbed or go on at every surface and leave their power
+// in its texels [Pattanaik & Mudur 1992]; the eye then reads the texels' irradiance at the first diffuse surface of its paths.
+#include "integrators/integrator.h"
+#include "transport/camera_path.h"
+#include "transport/texels.h"
+
+namespace gi {
+namespace {
+
+constexpr uint32_t kParticleStream = 0x70617274u;
+constexpr int kIndirectDepth = 1 << 20;
+constexpr uint8_t kAllLobes = kDiffuse | kGlossy | kSpecular | kTransparent;
+constexpr uint32_t kMostLayers = 64;  // that light without shadows passes
+constexpr int kBatch = 1024;  // particles that a thread takes at a time
+
+enum class DirectLight { kRays, kTexels };
+
+struct ParticleSettings {
+  int particles;
+  double texel_size;
+  size_t texel_memory;
+  DirectLight direct;
+  bool gather;
+  BounceLimits limits;
+  bool reflective_caustics, refractive_caustics;
+};
+
+// Where the power of one pass went, watts, channels added up. At every surface a particle goes on with the probability that keeps
+// its power what it was, so emitted = absorbed + escaped, but for shading normals, which may create power.
+struct Ledger {
+  double emitted = 0, absorbed = 0, escaped = 0, created = 0;
+  void add(const Ledger& o) { emitted += o.emitted, absorbed += o.absorbed, escaped += o.escaped, created += o.created; }
+};
+
+double sum(Rgb c) { return double(c.r) + double(c.g) + double(c.b); }
+
+// Bounces on a particle's way to a surface, counted as a path from the eye would: there the surface itself is the first bounce, and
+// the one nearest to the light only receives.
+struct ParticleBounces {
+  PathState counted;
+  int scattered = 0;
+  bool within = true;
+  uint8_t last = 0;  // flags of the lobe that sent it here
+
+  void scatter(uint8_t flags, const BounceLimits& limits) {
+    if (scattered++ > 0) within = advance(counted, flags, limits) && within;
+    last = flags;
+  }
+  // Whether a diffuse surface that it arrives at still sees it.
+  bool reaches_diffuse(const BounceLimits& limits) const {
+    PathState state = counted;
+    return within && (scattered == 0 || advance(state, kReflection | kDiffuse, limits));
+  }
+};
+
+struct Particle {
+  Sampler sampler;
+  Ray ray;
+  Rgb power;
+  ParticleBounces bounces;
+  PathState state;
+  uint32_t bounce = 0;
+};
+
+class ParticleIntegrator final : public Integrator {
+ public:
+  explicit ParticleIntegrator(const Parameters& p)
+      : s_{p.integer("particles"),
+           p.number("texel_size"),
+           size_t(p.number("texel_memory") * 0x1p20),
+           DirectLight(p.integer("direct")),
+           p.on("gather"),
+           {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
+            p.integer("transparent_bounces")},
+           p.on("caustics_reflective"),
+           p.on("caustics_refractive")} {}
+
+  void prepare(const RenderContext& context) override {
+    texels_ = std::make_unique<Texels>(context.scene, s_.texel_size, s_.texel_memory, context.pool, context.cancelled);
+    context.log.say(texels_->description());
+  }
+
+  void render_pass(const RenderContext& context, int pass, Film& film) override {
+    trace_particles(context, pass);
+    if (context.cancelled) return;
+    for_each_pixel(context, pass, film,
+                   [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) { look(context, film, camera, sampler, result); });
+  }
+
+ private:
+  void trace_particles(const RenderContext& context, int pass);
+  void trace_particle(const RenderContext& context, uint32_t index, float share, Ledger& ledger);
+  void carry(const RenderContext& context, const EmittedRay& emitted, Particle p, Ledger& ledger);
+  void look(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler, PixelSample& result) const;
+  Rgb read(const ShadingPoint& point, const Bsdf& bsdf) const;
+
+  // A bake of indirect light alone must be able to tell it apart.
+  bool direct_in_texels(const RenderContext& context) const {
+    return s_.direct == DirectLight::kTexels && !(context.lightmap && context.lightmap->first_depth() > 0);
+  }
+  bool is_caustic(uint8_t last) const {
+    if (!(last & (kGlossy | kSpecular))) return false;
+    return last & kTransmission ? !s_.refractive_caustics : !s_.reflective_caustics;
+  }
+
+  uint8_t no_caustics() const {
+    return uint8_t((s_.reflective_caustics ? 0 : kNoReflectiveCaustics) | (s_.refractive_caustics ? 0 : kNoRefractiveCaustics));
+  }
+
+  ParticleSettings s_;
+  std::unique_ptr<Texels> texels_;
+  Ledger ledger_;
+};
+
+// ---------------------------------------------------------------- from the light
+
+void ParticleIntegrator::trace_particles(const RenderContext& context, int pass) {
+  texels_->clear(context.lights.emitted_power());
+  const int batches = (s_.particles + kBatch - 1) / kBatch;
+  std::vector<Ledger> ledgers{size_t(batches)};
+  context.pool.for_each(batches, context.cancelled, [&](int b) {
+    for (int k = b * kBatch; k < std::min((b + 1) * kBatch, s_.particles); ++k)
+      trace_particle(context, uint32_t(pass) * uint32_t(s_.particles) + uint32_t(k), 1.0f / float(s_.particles), ledgers[size_t(b)]);
+  });
+  for (const Ledger& l : ledgers) ledger_.add(l);
+  const std::pair<const char*, double> figures[] = {{"emitted power", ledger_.emitted},
+                                                    {"absorbed power", ledger_.absorbed},
+                                                    {"escaped power", ledger_.escaped},
+                                                    {"created power", ledger_.created}};
+  for (const auto& [name, sum_of_passes] : figures) context.log.set(name, sum_of_passes / (pass + 1));
+}
+
+// What irradiance as the diffuse lobes see it has more than power per area: they weigh light by their own normals.
+float diffuse_share(const ShadingPoint& point, const Bsdf& bsdf) {
+  const float cos_geometric = dot(point.ng, point.wo);
+  if (!(cos_geometric > 1e-6f)) return 0.0f;
+  const float albedo = average(bsdf.diffuse_albedo(point.ng, kReflection));
+  if (albedo > 0.0f) return kPi * average(bsdf.eval(point.ng, point.wo, kReflection | kDiffuse).value) / (albedo * cos_geometric);
+  return std::max(dot(bsdf.mean_normal(), point.wo), 0.0f) / cos_geometric;
+}
+
+// Shading normals make scattering lopsided: what radiance loses, particles gain. [Veach 1997, eq. 5.19]
+float adjoint_factor(const ShadingPoint& point, const Bsdf& bsdf, Vec3 wi) {
+  const Vec3 n = bsdf.mean_normal();
+  const float shading = abs_dot(n, point.wo) * abs_dot(point.ng, wi), geometric = abs_dot(point.ng, point.wo) * abs_dot(n, wi);
+  if (dot(n, point.wo) <= 0.0f) return 0.0f;
+  return geometric > 1e-6f ? shading / geometric : 0.0f;
+}
+
+void ParticleIntegrator::trace_particle(const RenderContext& context, uint32_t index, float share, Ledger& ledger) {
+  Particle particle;
+  particle.sampler = Sampler(context.seed, kParticleStream, index);
+  const float u_choice = particle.sampler.next_1d();
+  const Vec2 u_place = particle.sampler.next_2d(), u_direction = particle.sampler.next_2d();
+  const auto emitted = context.lights.emit(u_choice, u_place, u_direction);
+  if (!emitted) return;
+  particle.ray = emitted->ray, particle.power = emitted->power * share;
+  particle.state.kind = kRayDiffuse;
+  ledger.emitted += sum(particle.power);
+  carry(context, *emitted, std::move(particle), ledger);
+}
+
+void ParticleIntegrator::carry(const RenderContext& context, const EmittedRay& emitted, Particle p, Ledger& ledger) {
+  Bsdf bsdf;
+  for (;; ++p.bounce) {
+    p.sampler.jump_to(p.bounce + 1);
+    const bool is_direct = p.bounces.scattered == 0;
+    const auto hit = context.scene.intersect(p.ray, is_direct ? ~0u : uint32_t(kRayDiffuse));
+    if (!hit) {
+      ledger.escaped += sum(p.power);
+      return;
+    }
+    ShadingPoint point = context.scene.shading_point(p.ray, *hit, p.state);
+    context.scene.shade(point, bsdf);
+    const uint32_t visible = context.scene.instances()[point.instance].data->visibility;
+    uint8_t kinds = kAllLobes;
+    if (is_caustic(p.bounces.last)) kinds &= uint8_t(~kDiffuse);
+    if (is_direct) {
+      if (!(emitted.visibility & kRayDiffuse)) kinds &= uint8_t(~kDiffuse);
+      if (!(emitted.visibility & kRayGlossy)) kinds &= uint8_t(~(kGlossy | kSpecular));
+      // What throws no shadow is lit and lets the light pass.
+      if ((!emitted.cast_shadow || !(visible & kRayShadow)) && p.bounce < kMostLayers) {
+        Particle beyond = p;
+        ++beyond.bounce;
+        beyond.ray = {offset_point(point.position, point.ng, p.ray.direction), p.ray.direction};
+        ledger.created += sum(p.power);
+        carry(context, emitted, std::move(beyond), ledger);
+      }
+    }
+    if (kinds != kAllLobes) bsdf.choose(kinds, point.wo);
+
+    // Leave the power, whether the particle goes on or not.
+    const bool is_lit = !is_direct || context.lights.turns_to(emitted, point.position);
+    if ((bsdf.flags() & kDiffuse) && is_lit && p.bounces.reaches_diffuse(s_.limits) && (!is_direct || direct_in_texels(context)))
+      texels_->deposit(point, point.backfacing, p.power * diffuse_share(point, bsdf));
+
+    // Go on with the probability of what is left, absorbed otherwise.
+    const float u_lobe = p.sampler.next_1d(), u_absorb = p.sampler.next_1d();
+    const auto next = bsdf.sample(point.wo, p.sampler.next_2d(), u_lobe);
+    const bool transparent = next && (next->flags & kTransparent);
+    Rgb left;
+    if (next && next->pdf_dir > 0.0f) left = p.power * next->value / next->pdf_dir;
+    if (!transparent && (!is_lit || !(visible & kRayDiffuse))) left = Rgb();
+    if (next && !transparent) left *= adjoint_factor(point, bsdf, next->wi);
+    const double before = sum(p.power), after = sum(left), alpha = std::min(1.0, after / before);
+    if (!(double(u_absorb) < alpha)) break;
+    p.power = left * float(1.0 / alpha);
+    ledger.created += std::max(after - before, 0.0);
+
+    // Follow it.
+    const bool within = advance(p.state, next->flags, s_.limits);
+    if (transparent && !within) break;
+    if (!transparent) p.bounces.scatter(next->flags, s_.limits);
+    if (!p.bounces.within || p.bounces.scattered > s_.limits.total) break;
+    p.ray = {offset_point(point.position, point.ng, next->wi), next->wi};
+  }
+  ledger.absorbed += sum(p.power);
+}
+
+// ---------------------------------------------------------------- from the eye
+
+// Radiance of the diffuse lobes towards the eye.
+Rgb ParticleIntegrator::read(const ShadingPoint& point, const Bsdf& bsdf) const {
+  Rgb radiance;
+  for (const uint8_t side : {kReflection, kTransmission}) {
+    const Rgb albedo = bsdf.diffuse_albedo(point.wo, side);
+    if (!is_black(albedo)) radiance += albedo * texels_->density(point, point.backfacing == (side == kReflection)) * kInvPi;
+  }
+  return radiance;
+}
+
+void ParticleIntegrator::look(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler,
+                              PixelSample& result) const {
+  constexpr LightSampling kMode = LightSampling::kMis;
+  Bsdf bsdf;
+  CameraPath path(camera);
+  bool may_scatter = true, may_gather = s_.gather;
+  const int first_depth = context.lightmap ? context.lightmap->first_depth() : 0;
+  const auto add = [&](Rgb radiance, int depth) {
+    if (depth >= first_depth) result.radiance += path.throughput * radiance;
+  };
+
+  for (uint32_t bounce = 0;; ++bounce) {
+    sampler.jump_to(bounce + 1);
+    const uint32_t visibility = visibility_of(path.state.kind);
+    const auto hit = context.scene.intersect(path.ray, visibility);
+    const int depth = path.state.depth;
+    add(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, kMode, visibility), depth);
+    if (!hit) {
+      add(path.leave(context, film, kMode, result), depth);
+      break;
+    }
+    const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
+    const Rgb emitted = surface_emission(context, point, bsdf.emission, path.origin, kMode);
+    if (depth == 0) result.emission += path.throughput * emitted;
+    add(emitted, depth);
+
+    const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
+    const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
+    const auto direct_light = [&](LightSampling mode) { return sample_direct_light(context, point, bsdf, mode, u_light_choice, u_light); };
+    const bool gathers = may_gather && (bsdf.flags() & kDiffuse);
+    if (may_scatter) {
+      // Diffuse lobes end the path: their light is in the texels, what comes straight from luminaires perhaps not.
+      if ((bsdf.flags() & kDiffuse) && !gathers) {
+        add(read(point, bsdf), kIndirectDepth);
+        bsdf.choose(kDiffuse, point.wo);
+        if (!direct_in_texels(context)) add(direct_light(LightSampling::kOn), depth + 1);
+        bsdf.choose(kAllLobes & ~kDiffuse, point.wo);
+      }
+      add(direct_light(kMode), depth + 1);
+    }
+
+    // The others go on.
+    const auto next = bsdf.sample(point.wo, u, u_lobe);
+    if (!next || !(next->pdf_dir > 0.0f)) break;
+    const bool transparent = next->flags & kTransparent;
+    if (!may_scatter && !transparent) break;
+    const Rgb weight = next->value / next->pdf_dir;
+    path.throughput *= weight;
+    if (is_black(path.throughput)) break;
+    path.travelled += hit->t;
+    if (transparent) {
+      if (!advance(path.state, next->flags, s_.limits)) break;
+      path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, path.ray.t_max - hit->t};
+      path.origin.query.path = path.state;
+      continue;
+    }
+    may_scatter = advance(path.state, next->flags, s_.limits);
+    const FilmSpec& spec = film.spec();
+    if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
+      path.seen_from_camera = false;
+    if (next->flags & kDiffuse) may_gather = false;
+    path.state.without = next->flags & kDiffuse ? no_caustics() : 0;
+    path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : next->pdf_dir};
+    path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+
+    const float alpha = std::min(1.0f, max_component(weight));
+    if (alpha < 1.0f) {
+      if (sampler.next_1d() >= alpha) break;
+      path.throughput *= 1.0f / alpha;
+    }
+  }
+}
+
+}  // namespace
+
+const Descriptor& particle_descriptor() {
+  using Kind = Parameter::Kind;
+  static const Descriptor descriptor{
+      "particle",
+      "Particle Tracing",
+      "Light is carried from the luminaires and left in the texels of diffuse surfaces; caustics included. Biased by the size of a texel, "
+      "and by reading rough diffuse surfaces as if light came to them evenly",
+      {
+          {"particles", "Particles", Kind::kInt, 200000, 1, 1e9, "Sent out in each pass"},
+          {"texel_size", "Texel Size", Kind::kFloat, 0.05, 1e-5, 1e4, "Wished size of the texels that light is gathered in", "LENGTH"},
+          {"texel_memory", "Texel Memory", Kind::kInt, 512, 1, 1 << 20,
+           "MiB that texels may take; they become coarser where it is not enough"},
+          {"direct",
+           "Direct Light",
+           Kind::kChoice,
+           0,
+           0,
+           1,
+           "Where the light is from that comes straight from luminaires",
+           "",
+           {{"RAYS", "Rays", "Shadow rays: crisp shadows"}, {"TEXELS", "Texels", "The texels, as all other light"}}},
+          {"gather", "Final Gather", Kind::kBool, 0, 0, 1, "Texels are read one diffuse bounce later: without their blur, but noisier"},
+          {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
+          {"diffuse_bounces", "Diffuse", Kind::kInt, 4, 0, 1024, "Diffuse reflections"},
+          {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},
+          {"transmission_bounces", "Transmission", Kind::kInt, 12, 0, 1024, "Refractions"},
+          {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
+          {"caustics_reflective", "Reflective Caustics", Kind::kBool, 1, 0, 1, "Mirrors and glossy surfaces seen by diffuse ones"},
+          {"caustics_refractive", "Refractive Caustics", Kind::kBool, 1, 0, 1, "Glass seen by diffuse surfaces"},
+      },
+      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<ParticleIntegrator>(p); },
+      true};
+  return descriptor;
+}
+
+}  // namespace gi
