@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from . import native
+from .scene_data import LIGHTMAP_CONTENTS
 
 EPILOG = "exit codes: 0 done; 1 the render failed; 2 bad arguments; 130 cancelled, with what was finished written"
 
@@ -32,8 +33,55 @@ def parser(commands_by_name: dict, in_blender: bool) -> argparse.ArgumentParser:
         metavar="OUT.png|.exr",
         help="default: where the scene says; '#'s hold the frame number",
     )
-    render.add_argument("--integrator", metavar="ID", help="see `gi-engine integrators`")
-    target = render.add_mutually_exclusive_group()
+    render.add_argument("--resolution", type=resolution, metavar="WxH", help="pixels")
+    render.add_argument(
+        "--frame", type=frames, metavar="N|A-B", help="one frame or a range; default: the scene's current frame"
+    )
+    add_sampling(render)
+    render.set_defaults(command=commands_by_name["render"])
+
+    bake = commands.add_parser("bake", help="bake the light on objects into lightmaps", epilog=EPILOG)
+    bake.add_argument("file", **file)
+    bake.add_argument("--object", action="append", required=True, metavar="NAME", help="whose surface; may be repeated")
+    bake.add_argument(
+        "--image", type=Path, required=True, metavar="OUT.exr", help="with several objects, their names are added to it"
+    )
+    bake.add_argument(
+        "--uv-map", default="", metavar="NAME", help="default: a fresh one, made without overlaps; see --save"
+    )
+    bake.add_argument(
+        "--content",
+        type=str.upper,
+        choices=[item[0] for item in LIGHTMAP_CONTENTS],
+        default="IRRADIANCE",
+        help="default: %(default)s",
+    )
+    bake.add_argument("--size", type=resolution, default=(512, 512), metavar="WxH", help="texels; default: 512x512")
+    bake.add_argument(
+        "--margin", type=at_least_one, default=8, metavar="N", help="texels filled beyond the edges; default: 8"
+    )
+    bake.add_argument("--no-denoise", action="store_true", help="keep the noise")
+    bake.add_argument(
+        "--save", type=Path, metavar="OUT.blend", help="keep the scene with its fresh UV maps and its lightmaps"
+    )
+    add_sampling(bake)
+    bake.set_defaults(command=commands_by_name["bake"])
+
+    info = commands.add_parser("info", help="say what would be rendered and what is not supported", epilog=EPILOG)
+    info.add_argument("file", **file)
+    info.set_defaults(command=commands_by_name["info"])
+
+    integrators = commands.add_parser("integrators", help="list the integrators and their parameters")
+    integrators.set_defaults(command=commands_by_name["integrators"])
+    for command in (render, bake, info, integrators):
+        command.add_argument("-v", "--verbose", action="store_true", help="show what Blender prints")
+    return program
+
+
+def add_sampling(command) -> None:
+    """What rendering and baking have in common: how light is followed, for how long."""
+    command.add_argument("--integrator", metavar="ID", help="see `gi-engine integrators`")
+    target = command.add_mutually_exclusive_group()
     target.add_argument("--samples", type=at_least_one, metavar="N", help="stop at N samples a pixel")
     target.add_argument("--time", type=positive, metavar="S", help="stop after S seconds of sampling")
     target.add_argument(
@@ -42,15 +90,11 @@ def parser(commands_by_name: dict, in_blender: bool) -> argparse.ArgumentParser:
         metavar="X",
         help="stop when 95 %% of the pixels have a relative standard error under X",
     )
-    render.add_argument("--resolution", type=resolution, metavar="WxH", help="pixels")
-    render.add_argument(
-        "--frame", type=frames, metavar="N|A-B", help="one frame or a range; default: the scene's current frame"
-    )
-    render.add_argument(
+    command.add_argument(
         "--threads", type=at_least_one, metavar="N", help="default: all cores, or the scene's fixed number"
     )
-    render.add_argument("--seed", type=seed, metavar="N", help="another seed, another pattern of noise")
-    render.add_argument(
+    command.add_argument("--seed", type=seed, metavar="N", help="another seed, another pattern of noise")
+    command.add_argument(
         "--set",
         type=assignment,
         action="append",
@@ -58,17 +102,6 @@ def parser(commands_by_name: dict, in_blender: bool) -> argparse.ArgumentParser:
         metavar="name=value",
         help="a parameter of the integrator",
     )
-    render.set_defaults(command=commands_by_name["render"])
-
-    info = commands.add_parser("info", help="say what would be rendered and what is not supported", epilog=EPILOG)
-    info.add_argument("file", **file)
-    info.set_defaults(command=commands_by_name["info"])
-
-    integrators = commands.add_parser("integrators", help="list the integrators and their parameters")
-    integrators.set_defaults(command=commands_by_name["integrators"])
-    for command in (render, info, integrators):
-        command.add_argument("-v", "--verbose", action="store_true", help="show what Blender prints")
-    return program
 
 
 def at_least_one(text: str) -> int:

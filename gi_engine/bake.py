@@ -11,25 +11,13 @@ import numpy as np
 
 from . import control, native
 from .denoise import denoise_lightmap
-from .export import export
+from .export import ExportError, export
 from .output import OutputError, Target
 from .scene_data import CAMERA, Film, Lightmap
 from .session import RenderFailed, Session
 
 FRESH_MAP = "Lightmap"  # the name of a UV map that is made for a bake
-CONTENTS = (
-    (
-        "IRRADIANCE",
-        "Irradiance",
-        "What a white diffuse surface would show: irradiance over pi. Multiply by the surface's colour",
-    ),
-    ("INDIRECT", "Indirect", "As Irradiance, without what comes straight from luminaires"),
-    (
-        "RADIOSITY",
-        "Radiosity",
-        "What the surface emits and scatters diffusely: radiosity over pi. Show it by emission of strength 1",
-    ),
-)
+USER_ERRORS = (ExportError, RenderFailed, native.NativeMissing)
 
 
 class BakeError(ValueError):

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import signal
 import sys
+from pathlib import Path
 
 from . import control, native
 from .arguments import ArgumentError, check_file, check_parameters, find_integrator, overrides, parser
@@ -18,6 +20,7 @@ from .display import display_on, duration, flush_all, quiet
 from .info import describe
 from .output import OutputError, Target, check_suffix, numbered
 
+FORBIDDEN = r'[\\/:*?"<>|]'  # in names of files
 DONE, FAILED, BAD_ARGUMENTS, CANCELLED = 0, 1, 2, 130
 
 
@@ -127,6 +130,76 @@ def render_frame(arguments, headless, scene, frame: int, wishes: Control, displa
         return (target.publish(path, "picture") if passes else []), passes
 
 
+def bake_command(arguments, out, err) -> int:
+    paths = check_bake(arguments)
+    wishes = Control(overrides=overrides(arguments), parameters=dict(arguments.set))
+    with controlled(wishes, err), ctrl_c(wishes):
+        headless = open_scene(arguments)
+        chosen = find_integrator(arguments.integrator or headless.bpy.context.scene.gi_engine.integrator)
+        check_parameters(chosen, wishes.parameters)
+        if not chosen["bakes"]:
+            raise ArgumentError(f'integrator "{chosen["id"]}" cannot bake lightmaps; choose another with --integrator')
+        with display_on(err) as display:
+            wishes.on_progress = display.update
+            code = bake_objects(arguments, headless, chosen["id"], paths, display, (out, err))
+        if arguments.save is not None and code == DONE:
+            headless.save_file(arguments.save)
+        return code
+
+
+def bake_objects(arguments, headless, integrator: str, paths: dict[str, Path], display, streams) -> int:
+    from . import bake
+
+    (width, height), (out, err) = arguments.size, streams
+    context = headless.bpy.context
+    try:
+        for name in paths:  # all that can be wrong before any is baked
+            bake.check_map(bake.find_object(context.view_layer, name), arguments.uv_map)
+        for name, path in paths.items():
+            request = bake.Request(name, arguments.uv_map, arguments.content, width, height, arguments.margin)
+            request.denoise = not arguments.no_denoise
+            display.begin(path.name)
+            image, uv_map, passes, warnings = bake.bake(context, request, path, integrator, control.cancelled)
+            for warning in warnings:
+                control.warn(warning)
+            if image is not None:
+                display.say(
+                    f'{path}: {passes} passes in {duration(control.current.last.seconds)}, UV map "{uv_map}"', out
+                )
+            if control.cancelled():
+                display.say("gi-engine: cancelled" + ("" if image else "; nothing is written"), err)
+                return CANCELLED
+    except bake.BakeError as error:
+        raise ArgumentError(str(error)) from error
+    except bake.USER_ERRORS as error:
+        raise RenderError(str(error)) from error
+    if not arguments.uv_map and arguments.save is None:
+        control.warn(f'the fresh UV map "{bake.FRESH_MAP}" is kept in no file; name one with --save')
+    return DONE
+
+
+def check_bake(arguments) -> dict[str, Path]:
+    """What can be known to be wrong before Blender starts. Returns the image of each object."""
+    check_file(arguments)
+    native.module()
+    if arguments.integrator is not None:
+        find_integrator(arguments.integrator)
+    if arguments.image.suffix.lower() != ".exr":
+        raise OutputError(f'image "{arguments.image}": the name must end in .exr')
+    names = list(dict.fromkeys(arguments.object))
+    image = arguments.image
+    paths = {
+        name: image if len(names) == 1 else image.with_stem(f"{image.stem}-{re.sub(FORBIDDEN, '_', name)}")
+        for name in names
+    }
+    if len(set(paths.values())) < len(paths):
+        raise ArgumentError("--object: two of the names would make the same name of a file")
+    for path in [*paths.values(), *([arguments.save] if arguments.save else [])]:
+        with Target(path):
+            pass
+    return paths
+
+
 def info_command(arguments, out, err) -> int:
     check_file(arguments)
     native.module()
@@ -166,7 +239,7 @@ def range_of(parameter: dict) -> str:
     return f"{kind}, {parameter.get('min'):g} to {parameter.get('max'):g} {parameter.get('unit', '')}".strip()
 
 
-COMMANDS = {"render": render_command, "info": info_command, "integrators": integrators_command}
+COMMANDS = {"render": render_command, "bake": bake_command, "info": info_command, "integrators": integrators_command}
 
 
 # What commands share

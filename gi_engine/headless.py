@@ -32,6 +32,14 @@ def register_once() -> None:
         register()
 
 
+def save_file(path: Path) -> None:
+    """Writes what is open as a .blend. Raises RenderError."""
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), copy=True, relative_remap=True)
+    except RuntimeError as error:
+        raise RenderError(f'"{path}" cannot be written: {message_of(error)}') from error
+
+
 def message_of(error: RuntimeError) -> str:
     """What Blender's operators say, without their decoration."""
     return str(error).strip().removeprefix("Error: ")

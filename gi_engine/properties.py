@@ -6,10 +6,11 @@ A scene follows its Cycles settings until one of ours is set (or copied): from t
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from . import native
 from .export.settings import SHARED
+from .scene_data import LIGHTMAP_CONTENTS as CONTENTS
 
 FILTERS = (
     ("BOX", "Box", "Equal weight over the filter's width"),
@@ -109,9 +110,30 @@ def settings_group(descriptors: list[dict], groups: dict[str, type]) -> type:
         annotations[name] = property_of(parameter)
     for name in annotations.keys() & SHARED.keys():
         annotations[name].keywords["update"] = take_over(name)
+    annotations["lightmap"] = PointerProperty(type=GI_PG_lightmap)
     for identifier, group in groups.items():
         annotations[identifier] = PointerProperty(type=group)
     return type("GI_PG_scene", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
+
+
+class GI_PG_lightmap(bpy.types.PropertyGroup):
+    """Of the button that bakes."""
+
+    content: EnumProperty(name="Content", description="What the lightmap holds", items=CONTENTS)
+    uv_map: StringProperty(
+        name="UV Map", description="Where on the image each face lies; empty for a fresh map without overlaps"
+    )
+    width: IntProperty(name="Width", description="Texels", default=512, min=4, max=16384, subtype="PIXEL")
+    height: IntProperty(name="Height", description="Texels", default=512, min=4, max=16384, subtype="PIXEL")
+    margin: IntProperty(
+        name="Margin", description="Texels filled beyond the edges of the map's islands", default=8, min=0, max=64
+    )
+    denoise: BoolProperty(name="Denoise", description="By Blender's own Open Image Denoise", default=True)
+    folder: StringProperty(
+        name="Folder",
+        description="For an EXR of each object; empty keeps images in the .blend file",
+        subtype="DIR_PATH",
+    )
 
 
 class GI_PG_view_layer(bpy.types.PropertyGroup):
@@ -126,7 +148,7 @@ def register() -> None:
     descriptors = native.integrators()
     groups = {d["id"]: integrator_group(d) for d in descriptors}
     scene_group = settings_group(descriptors, groups)
-    for cls in (*groups.values(), scene_group, GI_PG_view_layer):
+    for cls in (*groups.values(), GI_PG_lightmap, scene_group, GI_PG_view_layer):
         bpy.utils.register_class(cls)
         _registered.append(cls)
     bpy.types.Scene.gi_engine = PointerProperty(type=scene_group)

@@ -152,6 +152,21 @@ class Film:
     passes: list[str] = field(default_factory=lambda: ["Combined"])  # Cycles' 5.x names
 
 
+LIGHTMAP_CONTENTS = (
+    (
+        "IRRADIANCE",
+        "Irradiance",
+        "What a white diffuse surface would show: irradiance over pi. Multiply by the surface's colour",
+    ),
+    ("INDIRECT", "Indirect", "As Irradiance, without what comes straight from luminaires"),
+    (
+        "RADIOSITY",
+        "Radiosity",
+        "What the surface emits and scatters diffusely: radiosity over pi. Show it by emission of strength 1",
+    ),
+)
+
+
 @dataclass
 class Lightmap:
     """A bake: the film lies over an object's surface, as a UV map says."""

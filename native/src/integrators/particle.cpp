@@ -8,6 +8,7 @@ namespace gi {
 namespace {
 
 constexpr uint32_t kParticleStream = 0x70617274u;
+constexpr LightSampling kMode = LightSampling::kMis;
 constexpr int kIndirectDepth = 1 << 20;
 constexpr uint8_t kAllLobes = kDiffuse | kGlossy | kSpecular | kTransparent;
 constexpr uint32_t kMostLayers = 64;  // that light without shadows passes
@@ -93,6 +94,7 @@ class ParticleIntegrator final : public Integrator {
   void carry(const RenderContext& context, const EmittedRay& emitted, Particle p, Ledger& ledger);
   void look(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler, PixelSample& result) const;
   Rgb read(const ShadingPoint& point, const Bsdf& bsdf) const;
+  Rgb meet_light(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, PathState state, Vec2 u, float u_lobe) const;
 
   // A bake of indirect light alone must be able to tell it apart.
   bool direct_in_texels(const RenderContext& context) const {
@@ -229,9 +231,30 @@ Rgb ParticleIntegrator::read(const ShadingPoint& point, const Bsdf& bsdf) const 
   return radiance;
 }
 
+// Direct light by chance: luminaires that a ray of the chosen lobes meets before anything else.
+Rgb ParticleIntegrator::meet_light(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, PathState state, Vec2 u,
+                                   float u_lobe) const {
+  const auto next = bsdf.sample(point.wo, u, u_lobe);
+  if (!next || !(next->pdf_dir > 0.0f)) return Rgb();
+  const RayOrigin origin{light_query(point, bsdf), next->pdf_dir};
+  advance(state, next->flags, s_.limits);
+  const uint32_t visibility = visibility_of(state.kind);
+  Ray ray{offset_point(point.position, point.ng, next->wi), next->wi};
+  Rgb throughput = next->value / next->pdf_dir, found;
+  do {
+    const auto hit = context.scene.intersect(ray, visibility);
+    found += throughput * lamps_along(context, ray, hit ? hit->t : kInf, origin, kMode, visibility);
+    if (!hit) return found + throughput * light_beyond(context, ray, origin, kMode, state);
+    ShadingPoint met = context.scene.shading_point(ray, *hit, state);
+    found += throughput * surface_emission(context, met, context.scene.emission(met), origin, kMode);
+    throughput *= context.scene.transparency(met);
+    ray.origin = offset_point(met.position, met.ng, ray.direction);
+  } while (!is_black(throughput) && advance(state, kTransparent, s_.limits));
+  return found;
+}
+
 void ParticleIntegrator::look(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler,
                               PixelSample& result) const {
-  constexpr LightSampling kMode = LightSampling::kMis;
   Bsdf bsdf;
   CameraPath path(camera);
   bool may_scatter = true, may_gather = s_.gather;
@@ -264,7 +287,10 @@ void ParticleIntegrator::look(const RenderContext& context, const Film& film, co
       if ((bsdf.flags() & kDiffuse) && !gathers) {
         add(read(point, bsdf), kIndirectDepth);
         bsdf.choose(kDiffuse, point.wo);
-        if (!direct_in_texels(context)) add(direct_light(LightSampling::kOn), depth + 1);
+        if (!direct_in_texels(context)) {
+          add(direct_light(kMode), depth + 1);
+          add(meet_light(context, point, bsdf, path.state, u, u_lobe), depth + 1);
+        }
         bsdf.choose(kAllLobes & ~kDiffuse, point.wo);
       }
       add(direct_light(kMode), depth + 1);
