@@ -83,6 +83,35 @@ class TestLights {
     return out;
   }
 
+  // u_choice; u: place and direction, in turns. Columns: origin, direction, power, light (−1: none), the power by the ray's density at
+  // a point `along` metres further on, and pdf_dir there.
+  Table emit(Rows u_place, Rows u_direction, float along) const {
+    float* data;
+    Table out = make_table(u_place.shape(0), 14, &data);
+    for (size_t i = 0; i < u_place.shape(0); ++i) {
+      const Vec3 a = row_of(u_place, i), b = row_of(u_direction, i);
+      const auto r = lights_->emit(a.x, {a.y, a.z}, {b.x, b.y});
+      float* row = data + 14 * i;
+      row[9] = -1;
+      if (!r) continue;
+      const Vec3 o = r->ray.origin, d = r->ray.direction;
+      const float values[10] = {o.x, o.y, o.z, d.x, d.y, d.z, r->power.r, r->power.g, r->power.b, float(r->light)};
+      std::copy(values, values + 10, row);
+      const auto s = lights_->arriving(*r, {o + d * along, -d, false, {}});
+      if (!s) continue;
+      const Rgb power = s->radiance / lights_->pdf_emit(r->light, o + d * along, -d);
+      row[10] = power.r, row[11] = power.g, row[12] = power.b, row[13] = s->pdf_dir;
+    }
+    return out;
+  }
+
+  Table pdf_emit(Rows position, Rows wi, uint32_t light) const {
+    float* data;
+    Table out = make_table(position.shape(0), 1, &data);
+    for (size_t i = 0; i < position.shape(0); ++i) data[i] = lights_->pdf_emit(light, row_of(position, i), row_of(wi, i));
+    return out;
+  }
+
   // Processor seconds that `count` samples take at the given points, and their densities at the same.
   nb::tuple time(Rows position, Rows normal, int count) const {
     Sampler sampler(1, 2, 3);
@@ -144,6 +173,8 @@ void bind_lights(nb::module_& m) {
       .def("eval", &TestLights::eval, nb::arg("position"), nb::arg("normal"), nb::arg("wi"), nb::arg("transmission") = false,
            nb::arg("visibility") = uint32_t(kRayDiffuse))
       .def("pick_probabilities", &TestLights::pick_probabilities, nb::arg("position"), nb::arg("normal"), nb::arg("transmission") = false)
+      .def("emit", &TestLights::emit, nb::arg("u_place"), nb::arg("u_direction"), nb::arg("along") = 1.0f)
+      .def("pdf_emit", &TestLights::pdf_emit)
       .def("time", &TestLights::time)
       .def_prop_ro("count", &TestLights::count)
       .def_prop_ro("description", &TestLights::description)

@@ -45,16 +45,34 @@ inline ShapeEmission emit(const SpotLight& light, const SceneBall&, Vec2 u_place
   e.power *= light.attenuation(-direction);
   return e;
 }
+inline constexpr float kNarrow = 1.0f;  // tangent of half the spread below which directions follow the slats
+inline float sin2_spread(const AreaLight& light) {
+  return std::isfinite(light.tan_spread) ? sqr(light.tan_spread) / (1.0f + sqr(light.tan_spread)) : 1.0f;
+}
+// Density of the direction at an angle with this cosine, over the cosine.
+inline float pdf_slats(const AreaLight& light, float cos) {
+  if (!(cos > 0.0f)) return 0.0f;
+  const float sin2 = std::max(1.0f - cos * cos, 0.0f), t = light.tan_spread;
+  if (!(t < kNarrow)) return sin2 <= sin2_spread(light) * (1.0f + 1e-5f) ? kInvPi / sin2_spread(light) : 0.0f;
+  return 3.0f * kInvPi * std::max(1.0f - std::sqrt(sin2) / (cos * t), 0.0f) / (sqr(t) * sqr(sqr(cos)));
+}
 inline ShapeEmission emit(const AreaLight& light, const SceneBall&, Vec2 u_place, Vec2 u_direction) {
   const Vec2 disk = sample_disk(u_place);
   const Vec2 at = light.ellipse ? disk * 0.5f : Vec2{u_place.x - 0.5f, u_place.y - 0.5f};
   const Vec3 origin = light.center + light.u * (light.size_u * at.x) + light.v * (light.size_v * at.y);
   if (light.tan_spread == 0.0f) return {origin, light.normal, light.scale * kPi * light.area()};
-  // Cosine-weighted within what the slats let through.
-  const float sin2 = std::isfinite(light.tan_spread) ? sqr(light.tan_spread) / (1.0f + sqr(light.tan_spread)) : 1.0f;
-  const Vec2 d = sample_disk(u_direction) * std::sqrt(sin2);
-  const Vec3 direction = Frame::from_normal(light.normal).to_world({d.x, d.y, safe_sqrt(1.0f - d.x * d.x - d.y * d.y)});
-  return {origin, direction, light.radiance(origin, -direction) * kPi * sin2 * light.area()};
+  Vec3 local;
+  if (light.tan_spread < kNarrow) {
+    // As the slats let it through but for a cos⁴: 6x(1 − x) of x = tan θ / tan(spread/2), by inverting the smoothstep that is its integral.
+    const float x = 0.5f - std::sin(std::asin(1.0f - 2.0f * u_direction.x) / 3.0f), phi = 2.0f * kPi * u_direction.y;
+    local = normalize({x * light.tan_spread * std::cos(phi), x * light.tan_spread * std::sin(phi), 1.0f});
+  } else {
+    const Vec2 d = sample_disk(u_direction) * std::sqrt(sin2_spread(light));
+    local = {d.x, d.y, safe_sqrt(1.0f - d.x * d.x - d.y * d.y)};
+  }
+  const Vec3 direction = Frame::from_normal(light.normal).to_world(local);
+  const float pdf = pdf_slats(light, local.z) / light.area();
+  return {origin, direction, pdf > 0.0f ? light.radiance(origin, -direction) / pdf : 0.0f};
 }
 inline ShapeEmission emit(const SunLight& light, const SceneBall& ball, Vec2 u_place, Vec2 u_direction) {
   const auto s = light.sample({}, u_direction);
@@ -69,5 +87,49 @@ inline float emitted_power(const SpotLight& light, const SceneBall&) {
 }
 inline float emitted_power(const AreaLight& light, const SceneBall&) { return light.scale * kPi * light.area(); }
 inline float emitted_power(const SunLight& light, const SceneBall& ball) { return light.irradiance() * ball.cross_section(); }
+
+// What the lamp's `sample` would have said where a ray that it emitted has arrived.
+template <class S>
+std::optional<ShapeSample> arriving(const S& light, const LightQuery& query, const Ray& emitted) {
+  const Vec3 wi = -emitted.direction;
+  if constexpr (std::is_same_v<S, SunLight>) {
+    if (!light.has_shape()) return ShapeSample{wi, kInf, light.scale, 1.0f, true};
+    return ShapeSample{wi, kInf, light.scale, light.pdf_dir(), false};
+  } else {
+    bool is_delta;
+    if constexpr (std::is_same_v<S, AreaLight>)
+      is_delta = light.tan_spread == 0.0f;
+    else if constexpr (std::is_same_v<S, SpotLight>)
+      is_delta = light.point.radius == 0.0f;
+    else
+      is_delta = light.radius == 0.0f;
+    if (is_delta) {
+      auto s = light.sample(query, {0.5f, 0.5f});
+      if (s) s->wi = wi;
+      return s;
+    }
+    const auto t = light.intersect({query.position, wi});
+    if (!t) return std::nullopt;
+    return ShapeSample{wi, *t, light.radiance(query.position, wi), light.pdf_dir(query, wi), false};
+  }
+}
+
+// Density of `emit` for the ray that arrives at `position` from `wi`, per steradian and square metre across it; see LightSet::pdf_emit.
+inline float pdf_along(const PointLight& light, Vec3 position, float pdf_dir) {
+  const float d2 = length_squared(light.center - position), r2 = sqr(light.radius);
+  if (r2 == 0.0f) return pdf_dir / d2;
+  return light.sphere && d2 <= r2 ? 0.0f : pdf_dir * kInvPi / r2;  // nothing is emitted into a sphere
+}
+inline float pdf_ray(const PointLight& light, const SceneBall&, Vec3 position, Vec3) { return pdf_along(light, position, 0.25f * kInvPi); }
+inline float pdf_ray(const SpotLight& light, const SceneBall&, Vec3 position, Vec3 wi) {
+  if (0.5f * length_squared(light.axis + wi) > light.one_minus_cos_world * (1.0f + 1e-5f)) return 0.0f;
+  return pdf_along(light.point, position, 0.5f * kInvPi / light.one_minus_cos_world);
+}
+inline float pdf_ray(const AreaLight& light, const SceneBall&, Vec3, Vec3 wi) {
+  return (light.tan_spread == 0.0f ? 1.0f : pdf_slats(light, -dot(light.normal, wi))) / light.area();
+}
+inline float pdf_ray(const SunLight& light, const SceneBall& ball, Vec3, Vec3) {
+  return (light.has_shape() ? light.pdf_dir() : 1.0f) / ball.cross_section();
+}
 
 }  // namespace gi

@@ -45,6 +45,7 @@ struct EmittedRay {
   uint32_t light = 0;
   bool cast_shadow = true;
   uint32_t visibility = 0xffffffffu;  // RayKind bits: what of a surface the light reaches
+  Vec2 barycentrics = {};  // of its place on an emissive triangle
 };
 
 class LightSet {
@@ -80,6 +81,17 @@ class LightSet {
   std::optional<EmittedRay> emit(float u_choice, Vec2 u_place, Vec2 u_direction) const;
   // Whether light that was emitted like this is what `position` sees: Blender's lamps of soft falloff turn to whoever looks.
   bool turns_to(const EmittedRay& emitted, Vec3 position) const;
+  // What `sample` would have said at `query` of light that was emitted like this and arrived there; none where that point does not
+  // see it (lamps of soft falloff turn to whoever looks).
+  std::optional<LightSample> arriving(const EmittedRay& emitted, const LightQuery& query) const;
+  // Density with which `emit` makes the ray from `light` that arrives at `position` from `wi`: per steradian and square metre across
+  // the ray, choice included. Where place or direction is fixed (delta lights) it is left out, and what remains is as seen from
+  // `position`; so radiance / pdf_emit is the power of the ray for every kind of light.
+  float pdf_emit(uint32_t light, Vec3 position, Vec3 wi) const;
+  const LampData* lamp(uint32_t light) const;  // null for triangles and the world
+  uint32_t light_of_triangle(uint32_t instance, uint32_t triangle) const;  // kNoId: none
+  uint32_t light_of_sun(uint32_t sun) const;
+  uint32_t world_light() const;
   float emitted_power() const;  // of everything, about, |luminance|
   std::string description() const;  // how many of what
 

@@ -39,6 +39,8 @@ struct TriangleLight {
     return sample_by_area(position, u);
   }
 
+  bool shines_to(Vec3 position) const { return dot(position - a, n) > 0.0f ? front : back; }
+
   // Density of `sample` at the point in direction `wi`, which is on the triangle.
   float pdf_dir(Vec3 position, Vec3 wi) const {
     if (!shines_to(position)) return 0.0f;
@@ -75,8 +77,6 @@ struct TriangleLight {
       by_angle = solid_angle > kMinSolidAngle && solid_angle < kMaxSolidAngle;
     }
   };
-
-  bool shines_to(Vec3 position) const { return dot(position - a, n) > 0.0f ? front : back; }
 
   std::optional<TriangleSample> sample_by_area(Vec3 position, Vec2 u) const {
     const Vec2 b = sample_triangle(u);
