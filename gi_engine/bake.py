@@ -42,6 +42,7 @@ class Request:
 
 def find_object(view_layer, name: str):
     """Raises BakeError unless the object can be baked."""
+    view_layer.update()  # what was just linked is not there yet
     item = view_layer.objects.get(name)
     if item is None:
         raise BakeError(f'there is no object "{name}" in view layer "{view_layer.name}"')
@@ -126,6 +127,7 @@ def begin(depsgraph, request: Request, integrator: str | None = None) -> tuple[S
 
 def prepare(context, request: Request, integrator: str | None = None) -> tuple[Session, Request, list[str]]:
     """Checks, unwraps where no map is chosen, and builds. The request that comes back names the map."""
+    context.scene.update_tag()  # scripts' changes of settings would go unnoticed
     item = find_object(context.view_layer, request.object)
     check_map(item, request.uv_map)
     if request.uv_map:
@@ -186,31 +188,37 @@ def fill(light: np.ndarray, known: np.ndarray, margin: int) -> tuple[np.ndarray,
 def store(name: str, pixels: np.ndarray, path: Path | None):
     """The 32-bit Blender image of that name, made where there is none; also an EXR where `path` is given. Raises OutputError."""
     height, width, _ = pixels.shape
-    image = bpy.data.images.get(name)
-    if image and (
-        tuple(image.size) != (width, height) or not image.is_float or image.source not in {"GENERATED", "FILE"}
-    ):
-        bpy.data.images.remove(image)
-        image = None
-    if image is None:
-        image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
-    image.colorspace_settings.is_data = False
+    # Always a new one in the old one's place: a packed image would go back to what it was.
+    image, old = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True), bpy.data.images.get(name)
+    if old != image:
+        old.user_remap(image)
+        bpy.data.images.remove(old)
+        image.name = name
     image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
     image.update()
-    if path is None:
-        image.pack()
-        return image
-    with Target(path) as target:
-        written = target.folder / ("lightmap" + path.suffix)
-        image.file_format = "OPEN_EXR"
-        image.filepath_raw = str(written)
-        try:
-            image.save()
-        except RuntimeError as error:
-            raise OutputError(f'output "{path}" cannot be written: {str(error).strip()}') from error
-        target.publish(path, "lightmap")
-    image.filepath_raw = str(path)
+    if path is not None:
+        with Target(path) as target:
+            save(image, target.folder / ("lightmap" + path.suffix))
+            target.publish(path, "lightmap")
+    image.pack()
+    if path is not None:
+        image.filepath_raw = str(path)
     return image
+
+
+def save(image, path: Path) -> None:
+    """As an EXR of full floats, by way of a scene of its own: Image.save() would encode a generated image as sRGB."""
+    scene = bpy.data.scenes.new("Lightmap")
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):  # from 5.0 on
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGBA"
+    try:
+        image.save_render(str(path), scene=scene)
+    except RuntimeError as error:
+        raise OutputError(f'output "{path}" cannot be written: {str(error).strip()}') from error
+    finally:
+        bpy.data.scenes.remove(scene)
 
 
 def bake(context, request: Request, path: Path | None, integrator: str | None = None, stopped=lambda: False):
@@ -229,6 +237,37 @@ def bake(context, request: Request, path: Path | None, integrator: str | None = 
         pixels, more = finished(session, request)
     image = store(f"{request.object} {FRESH_MAP}", pixels, path)
     return image, request.uv_map, progress["passes"], warnings + more
+
+
+DIRECT, INDIRECT, COLOR = 64, 128, 256  # of Blender's pass_filter; RE_pipeline's order, checked by a test
+
+
+def bake_for_blender(depsgraph, item, pass_type: str, pass_filter: int, size: tuple[int, int], stopped):
+    """What Blender's own Bake button asks for: (height, width, 4) and warnings. Margin and images are Blender's affair."""
+    if pass_type != "DIFFUSE":
+        raise BakeError(f"GI Engine bakes the type Diffuse, not {pass_type.title()}")
+    uv = item.data.uv_layers.active
+    if uv is None:
+        raise BakeError(f'object "{item.name}" has no UV map to bake to')
+    if pass_filter & COLOR and not pass_filter & (DIRECT | INDIRECT):
+        raise BakeError("Diffuse needs Direct or Indirect light: its colour alone is no light")
+    if pass_filter & DIRECT and not pass_filter & INDIRECT:
+        raise BakeError("Direct light alone cannot be baked: choose Indirect too, or alone")
+    colored, indirect = bool(pass_filter & COLOR), not pass_filter & DIRECT
+    if colored and indirect:
+        raise BakeError("Indirect light alone is baked without Color: switch Direct on, or Color off")
+    content = "RADIOSITY" if colored else "INDIRECT" if indirect else "IRRADIANCE"
+    request = Request(item.name, uv.name, content, *size, margin=0, denoise=False)
+    session, warnings = begin(depsgraph, request)
+    with session:
+        while not session.wait():
+            if stopped():
+                session.native.cancel()
+            tell(session.progress())
+        light = session.read("Combined")
+        if content == "RADIOSITY":  # Blender's Diffuse leaves out what the surface emits
+            light[..., :3] -= session.read("Emission")
+    return light, warnings
 
 
 def tell(progress: dict) -> None:

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from . import control, native
+from .bake import BakeError, bake_for_blender
 from .display import duration
 from .export import Exported, ExportError, export
 from .passes import contract_name, passes_of
@@ -22,7 +23,7 @@ WINDOW = not bpy.app.background
 # Seconds between what is told. Each status has the window draw the picture anew; without one, it is a line on the console.
 STATUS_SECONDS = 0.5 if WINDOW else 5.0
 SHOW_SECONDS, SHOW_SECONDS_LATER = 0.25, 3.0
-USER_ERRORS = (ExportError, RenderFailed, native.NativeMissing)
+USER_ERRORS = (BakeError, ExportError, RenderFailed, native.NativeMissing)
 
 LEAVE_SECONDS = 10.0  # that a render has to stop when the add-on is switched off
 
@@ -177,6 +178,24 @@ class GIEngine(bpy.types.RenderEngine):
         if WINDOW:
             self.error_set(message)
         self.report({"ERROR"}, message)
+
+    def bake(self, depsgraph, obj, pass_type, pass_filter, width, height):
+        """Blender's own Bake button, once for each object and image. The active UV map is the one it bakes to."""
+        _running.append("bake")
+        # The name has to differ from call to call: the same one again would overwrite the first image.
+        result = self.begin_result(0, 0, width, height, layer=f"bake {obj.name} {time.monotonic_ns()}")
+        try:
+            pixels, warnings = bake_for_blender(depsgraph, obj, pass_type, pass_filter, (width, height), self.stopped)
+            for message in warnings:
+                self.warn(message)
+            combined = result.layers[0].passes["Combined"]
+            combined.rect.foreach_set(np.ascontiguousarray(pixels[..., : combined.channels], np.float32).ravel())
+            self.end_result(result)
+        except Exception as error:
+            self.end_result(result, cancel=True)
+            self.fail(error)
+        finally:
+            _running.pop()
 
     def update_render_passes(self, scene=None, renderlayer=None):
         for p in passes_of(renderlayer):
