@@ -131,6 +131,8 @@ class GIEngine(bpy.types.RenderEngine):
         progress = session.progress()
         self.next_status = 0.0
         self.tell(progress)
+        for message in session.native.messages():
+            self.report({"INFO"}, message)
         if progress["bad_samples"]:
             self.warn(f"{progress['bad_samples']} samples were not finite numbers and were left out")
 

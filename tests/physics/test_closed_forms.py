@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from light_scenes import emission, lamp, matrix
 
+from gi_engine import native
 from gi_engine import scene_data as sd
 from gi_engine.nodes.program import ProgramBuilder
 from gi_engine.session import Session
@@ -324,7 +325,7 @@ def test_multiple_importance_beats_the_wrong_single_way(roughness, size, bad_way
 # -------------------------------------------------------------------------------------------------- determinism
 
 
-@pytest.mark.parametrize("integrator", ["path", "distributed", "whitted"])
+@pytest.mark.parametrize("integrator", [descriptor["id"] for descriptor in native.integrators()])
 def test_any_number_of_threads_makes_the_same_image(integrator):
     floor = quad((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0))
     bulb = lamp("POINT", (50.0,) * 3, matrix=matrix((0, 0, 1.5)), radius=0.2)

@@ -44,7 +44,7 @@ LatticeKey key_of(const Scene& scene, uint32_t i) {
   return {instance.mesh, int(std::lround(2.0 * std::log2(double(scale)))), kNoId};
 }
 
-// A small triangle in the world, and the places between which sight is tested: a little above it and a little inside.
+// A small triangle in the world, between whose points sight is tested, a little above it; corners a little inside, for walls end there.
 struct SightCell {
   Vec3 corner[3], middle, up;
   SightCell(const Scene& scene, uint32_t instance, const LatticeCell& cell, bool back) {
@@ -57,9 +57,9 @@ struct SightCell {
     for (size_t k = 0; k < 3; ++k) corner[k] = v[0] + float(cell.at[k][0]) * e1 + float(cell.at[k][1]) * e2;
     middle = (corner[0] + corner[1] + corner[2]) / 3.0f;
   }
+  Vec3 inside(size_t k) const { return lerp(corner[k], middle, 0.03f); }
   bool sees(const Scene& scene, Vec3 a, Vec3 b) const {
-    constexpr float kInside = 0.03f;
-    const Vec3 from = lerp(a, middle, kInside) + up, to = lerp(b, middle, kInside) + up;
+    const Vec3 from = a + up, to = b + up;
     const float distance = length(to - from);
     return !(distance > 0.0f) || !scene.intersect({from, (to - from) / distance, 0.0f, distance}, kSightMask);
   }
@@ -186,7 +186,7 @@ void Texels::test_triangle(uint32_t instance, uint32_t triangle, bool back, std:
   if (lattice.is_merged(triangle)) return;
   const auto is_split = [&](const SightCell& s) {
     for (size_t k = 0; k < 3; ++k)
-      if (!s.sees(scene_, s.corner[k], s.corner[(k + 1) % 3]) || !s.sees(scene_, s.corner[k], s.middle)) return true;
+      if (!s.sees(scene_, s.inside(k), s.inside((k + 1) % 3)) || !s.sees(scene_, s.inside(k), s.middle)) return true;
     return false;
   };
   for (uint32_t k = 0; k < lattice.cells_of(triangle); ++k)
@@ -219,7 +219,7 @@ void Texels::measure_split(uint32_t instance, bool back, uint32_t triangle, uint
 void Texels::weigh_by_sight(uint32_t instance, bool back, Vec3 position, LatticeCell& cell) const {
   const SightCell s(scene_, instance, cell, back);
   float seen[3], sum = 0;
-  for (size_t k = 0; k < 3; ++k) sum += seen[k] = s.sees(scene_, position, s.corner[k]) ? cell.weight[k] : 0.0f;
+  for (size_t k = 0; k < 3; ++k) sum += seen[k] = s.sees(scene_, position, s.inside(k)) ? cell.weight[k] : 0.0f;
   if (!(sum > 1e-4f)) return;
   for (int k = 0; k < 3; ++k) cell.weight[k] = seen[k] / sum;
 }
