@@ -131,11 +131,10 @@ class Compiler:
         grey, white, none = (DEFAULT_GREY,) * 3, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
         if not self.principled_default:
             return self._plain("default material", grey)
-        coat_and_sheen = (0.0, 0.03, 1.5, white, none, 0.0, 0.5, white)
-        base = (grey, 0.0, 0.5, 1.5, 0.0, 0.0, 0.0, 0.0, 0.5, white, 0.0, 0.0, none)
-        transmission_and_film = (0.0, 0.0, 1.33)
         builder = ProgramBuilder()
-        builder.op("principled", 1.0, 1.0, none, *coat_and_sheen, *base, *transmission_and_film, imm=(MULTI_GGX,))
+        unbrushed, no_film = (0.0, 0.0, none), (0.0, 1.33)
+        below = builder.op("specular_layer", 1.0, none, 0.5, 1.5, 0.5, white, *unbrushed, *no_film, imm=(MULTI_GGX,))
+        builder.op("base_layer", below, none, grey, 0.0, 0.0, 0.0, 0.0)
         return builder.finish("default material")
 
     def _plain(self, name: str, color: tuple) -> Program:

@@ -157,55 +157,93 @@ def metallic(b, weight):
 
 @closure_rule("ShaderNodeBsdfPrincipled")
 def principled(b, weight):
+    """Layers from the top down; each op gives the weight that is left for the next. Those that cannot show are left out."""
+    from ..export.version import metal_has_no_film  # needs bpy
+
     alpha = b.input("Alpha")
     if (number(b, alpha) or 0.0) < 1.0:
         b.op("alpha", weight, alpha)
-    base_normal, top = normal(b), principled_top(b)
-    principled_emission(b, weight, alpha, base_normal, top)
-    subsurface, thin_wall = b.input("Subsurface Weight"), b.input("Thin Wall", default=0.0)
+        weight = b.op("math_multiply", weight, b.op("saturate", alpha))
+    below = principled_top(b, weight)
+    principled_emission(b, weight, below)
+    color, roughness, ior, tint = b.input("Base Color"), b.input("Roughness"), b.input("IOR"), b.input("Specular Tint")
+    anisotropy, thin_wall, coating = b.input("Anisotropic"), b.input("Thin Wall", default=0.0), film(b)
+    brushed = anisotropy, b.input("Anisotropic Rotation"), tangent(b, anisotropy)
+    distribution = (DISTRIBUTIONS[b.node.distribution],)
+    metallic, transmission = b.input("Metallic"), b.input("Transmission Weight")
+    if not is_zero(b, metallic):
+        metal_film = (0.0, coating[1]) if metal_has_no_film() else coating
+        below = b.op(
+            "metal_layer", below, normal(b), metallic, color, tint, roughness, *brushed, *metal_film, imm=distribution
+        )
+        if (number(b, metallic) or 0.0) >= 1.0:
+            return
+    if not is_zero(b, transmission):
+        below = b.op(
+            "glass_layer",
+            below,
+            normal(b),
+            transmission,
+            color,
+            tint,
+            roughness,
+            ior,
+            thin_wall,
+            *coating,
+            imm=distribution,
+        )
+        if (number(b, transmission) or 0.0) >= 1.0:
+            return
+    below = b.op(
+        "specular_layer", below, normal(b), roughness, ior, b.input("Specular IOR Level"), tint, *brushed, *coating,
+        imm=distribution,
+    )  # fmt: skip
+    subsurface = b.input("Subsurface Weight")
     if not is_zero(b, subsurface) and number(b, thin_wall) in (None, 0.0):
         b.warn("subsurface scattering is not rendered yet; it is diffuse of the same albedo")
-    anisotropy = b.input("Anisotropic")
-    for share, metal, coating in principled_films(b, weight):
-        b.op(
-            "principled", share, alpha, base_normal, *top,
-            b.input("Base Color"), metal, b.input("Roughness"), b.input("IOR"), thin_wall,
-            b.input("Diffuse Roughness"), subsurface, b.input("Subsurface Anisotropy"),
-            b.input("Specular IOR Level"), b.input("Specular Tint"),
-            anisotropy, b.input("Anisotropic Rotation"), tangent(b, anisotropy),
-            b.input("Transmission Weight"), *coating, imm=(DISTRIBUTIONS[b.node.distribution],),
-        )  # fmt: skip
-
-
-def principled_films(b, weight) -> list[tuple]:
-    """(weight, metallic, film) of the parts of the surface: two where metal has no film and the rest has one."""
-    from ..export.version import metal_has_no_film  # needs bpy
-
-    metallic, (thickness, ior) = b.input("Metallic"), film(b)
-    if not metal_has_no_film() or is_zero(b, thickness) or is_zero(b, metallic):
-        return [(weight, metallic, (thickness, ior))]
-    rest, metal = b.op("mix_weights", weight, metallic)
-    parts = [(metal, 1.0, (0.0, ior)), (rest, 0.0, (thickness, ior))]
-    return parts[:1] if (number(b, metallic) or 0.0) >= 1.0 else parts
-
-
-def principled_top(b) -> tuple:
-    return (
-        b.input("Coat Weight"), b.input("Coat Roughness"), b.input("Coat IOR"), b.input("Coat Tint"), normal(b, "Coat Normal"),
-        b.input("Sheen Weight"), b.input("Sheen Roughness"), b.input("Sheen Tint"),
+    b.op(
+        "base_layer", below, normal(b), color, b.input("Diffuse Roughness"), subsurface, b.input("Subsurface Anisotropy"),
+        thin_wall,
     )  # fmt: skip
 
 
-def principled_emission(b, weight, alpha, base_normal, top) -> None:
+def principled_top(b, weight):
+    """What lies over everything, the emission too: sheen, then coat. Returns the weight that they leave."""
+    coat, sheen = b.input("Coat Weight"), b.input("Sheen Weight")
+    coat_normal = normal(b, "Coat Normal")
+    if not is_zero(b, sheen):
+        weight = b.op(
+            "sheen_layer",
+            weight,
+            normal(b),
+            coat_normal,
+            coat,
+            sheen,
+            b.input("Sheen Roughness"),
+            b.input("Sheen Tint"),
+        )
+    if not is_zero(b, coat):
+        weight = b.op(
+            "coat_layer",
+            weight,
+            coat_normal,
+            coat,
+            b.input("Coat Roughness"),
+            b.input("Coat IOR"),
+            b.input("Coat Tint"),
+        )
+    return weight
+
+
+def principled_emission(b, weight, below) -> None:
     """Emits only where there is something to emit: every emitting triangle becomes a light."""
     color, strength = b.input("Emission Color"), b.input("Emission Strength")
     if is_zero(b, color) or is_zero(b, strength):
         return
-    covered = not (is_zero(b, b.input("Coat Weight")) and is_zero(b, b.input("Sheen Weight")))
-    if number(b, alpha) == 1.0 and not covered:
+    if below is weight:
         b.op("emission", weight, color, strength)
     else:
-        b.op("principled_emission", weight, alpha, base_normal, *top, color, strength)
+        b.op("emission", 1.0, b.op("vector_multiply", color, below), strength)
 
 
 # -------------------------------------------------------------------- fallbacks

@@ -50,7 +50,7 @@ class Shader:
         while at < len(program.code):
             name, outputs, inputs, immediates = by_code[int(program.code[at])]
             at += 1 + len(outputs) + len(inputs) + immediates
-            if not outputs and name != "jump_if_zero":
+            if (not outputs and name != "jump_if_zero") or name.endswith("_layer"):
                 names.append(name)
         return names
 
@@ -104,25 +104,34 @@ def test_all_inputs_of_the_principled_bsdf_are_read(shader, monkeypatch):
 
     monkeypatch.setattr(compiler.TreeWalker, "value", noted)
     monkeypatch.setattr(compiler.TreeWalker, "resolve", noted_link)
-    node = shader.new("ShaderNodeBsdfPrincipled", {"Emission Strength": 1.0, "Anisotropic": 0.5})
+    shows = ("Metallic", "Transmission Weight", "Coat Weight", "Sheen Weight", "Anisotropic", "Emission Strength")
+    node = shader.new("ShaderNodeBsdfPrincipled", dict.fromkeys(shows, 0.5))
     shader.compile(node)
     assert {s.name for s in node.inputs} - read == SUBSURFACE | {"Weight"}
 
 
 def test_principled_emits_and_lets_through_only_what_it_must(shader):
+    plain = ["specular_layer", "base_layer"]
     node = shader.new("ShaderNodeBsdfPrincipled")
-    assert shader.ops(node) == ["principled"]
+    assert shader.ops(node) == plain
     node.inputs["Alpha"].default_value = 0.5
-    assert shader.ops(node) == ["alpha", "principled"]
+    assert shader.ops(node) == ["alpha", *plain]
     node.inputs["Emission Strength"].default_value = 1.0
-    assert shader.ops(node) == ["alpha", "principled_emission", "principled"]
+    assert shader.ops(node) == ["alpha", "emission", *plain]
     node.inputs["Emission Color"].default_value = (0, 0, 0, 1)
-    assert shader.ops(node) == ["alpha", "principled"]
+    assert shader.ops(node) == ["alpha", *plain]
     off = shader.new("ShaderNodeValue")
     off.outputs[0].default_value = 0.0
     node.inputs["Emission Color"].default_value = (1, 1, 1, 1)
     shader.tree.links.new(off.outputs[0], node.inputs["Emission Strength"])
-    assert shader.ops(node) == ["alpha", "principled"]  # linked, but known to be 0
+    assert shader.ops(node) == ["alpha", *plain]  # linked, but known to be 0
+
+
+def test_principled_has_the_layers_that_show(shader):
+    node = shader.new("ShaderNodeBsdfPrincipled", {"Coat Weight": 0.5, "Sheen Weight": 0.5, "Transmission Weight": 0.5})
+    assert shader.ops(node) == ["sheen_layer", "coat_layer", "glass_layer", "specular_layer", "base_layer"]
+    node.inputs["Metallic"].default_value = 1.0
+    assert shader.ops(node) == ["sheen_layer", "coat_layer", "metal_layer"]
 
 
 def test_mix_shader(shader):

@@ -39,7 +39,7 @@ def instructions(draw):
     return code
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=1500, deadline=None)
 @given(instructions(), st.lists(st.floats(width=32), min_size=12, max_size=12), st.integers(0, 64))
 def test_random_instructions(code, constants, tables):
     try:

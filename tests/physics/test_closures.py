@@ -128,8 +128,7 @@ def test_sheen_reflects_what_a_layer_of_fibres_does(cos_o, roughness):
 # -------------------------------------------------------------------- Principled
 
 PLAIN = {
-    "weight": 1.0, "alpha": 1.0, "normal": (0, 0, 0),
-    "coat": 0.0, "coat_roughness": 0.03, "coat_ior": 1.5, "coat_tint": (1, 1, 1), "coat_normal": (0, 0, 0),
+    "coat": 0.0, "coat_roughness": 0.03, "coat_ior": 1.5, "coat_tint": (1, 1, 1),
     "sheen": 0.0, "sheen_roughness": 0.5, "sheen_tint": (1, 1, 1),
     "base_color": (1, 1, 1), "metallic": 0.0, "roughness": 0.5, "ior": 1.5, "thin_wall": 0.0,
     "diffuse_roughness": 0.0, "subsurface": 0.0, "subsurface_anisotropy": 0.0, "specular": 0.5, "specular_tint": (1, 1, 1),
@@ -164,15 +163,34 @@ WHITE = {
 def shaded(op, *inputs, imm=(), cos_o=1.0, backfacing=False):
     b = ProgramBuilder()
     b.op(op, *inputs, imm=imm)
+    return shaded_by(b, cos_o, backfacing)
+
+
+def shaded_by(b, cos_o, backfacing):
     p = b.finish("test")
     wo = tuple(float(x) for x in view(cos_o)[0])
     return _core.ShadedPoint(p.code.tolist(), p.constants.tolist(), p.register_count, p.tables.tolist(), wo, backfacing)
 
 
 def principled(cos_o=1.0, backfacing=False, **changes):
+    """All layers of the Principled BSDF, as its rule stacks them."""
     unknown = set(changes) - set(PLAIN)
     assert not unknown
-    return shaded("principled", *{**PLAIN, **changes}.values(), imm=(MULTISCATTER,), cos_o=cos_o, backfacing=backfacing)
+    p = {**PLAIN, **changes}
+    b = ProgramBuilder()
+    unlinked, film, imm = (0, 0, 0), (p["film"], p["film_ior"]), (MULTISCATTER,)
+    brushed = p["anisotropic"], p["rotation"], p["tangent"]
+    below = b.op("sheen_layer", 1.0, unlinked, unlinked, p["coat"], p["sheen"], p["sheen_roughness"], p["sheen_tint"])
+    below = b.op("coat_layer", below, unlinked, p["coat"], p["coat_roughness"], p["coat_ior"], p["coat_tint"])
+    metal = p["metallic"], p["base_color"], p["specular_tint"], p["roughness"]
+    below = b.op("metal_layer", below, unlinked, *metal, *brushed, *film, imm=imm)
+    glass = p["transmission"], p["base_color"], p["specular_tint"], p["roughness"], p["ior"], p["thin_wall"]
+    below = b.op("glass_layer", below, unlinked, *glass, *film, imm=imm)
+    specular = p["roughness"], p["ior"], p["specular"], p["specular_tint"]
+    below = b.op("specular_layer", below, unlinked, *specular, *brushed, *film, imm=imm)
+    base = p["base_color"], p["diffuse_roughness"], p["subsurface"], p["subsurface_anisotropy"], p["thin_wall"]
+    b.op("base_layer", below, unlinked, *base)
+    return shaded_by(b, cos_o, backfacing)
 
 
 @pytest.mark.parametrize("cos_o", [1.0, 0.6, 0.15])
@@ -240,8 +258,10 @@ def test_thin_glass_is_the_series_of_its_reflections():
 
 
 def test_emission_lies_under_the_coat():
-    top = (1.0, 0.0, 1.5, (1, 1, 1), (0, 0, 0), 0.0, 0.5, (1, 1, 1))
-    emitted = shaded("principled_emission", 0.5, 1.0, (0, 0, 0), *top, (1.0, 2.0, 3.0), 2.0).emission
+    b = ProgramBuilder()
+    below = b.op("coat_layer", 0.5, (0, 0, 0), 1.0, 0.0, 1.5, (1, 1, 1))
+    b.op("emission", 1.0, b.op("vector_multiply", (1.0, 2.0, 3.0), below), 2.0)
+    emitted = shaded_by(b, 1.0, False).emission
     assert emitted == pytest.approx(np.array([1.0, 2.0, 3.0]) * 0.96, rel=0.01)  # 4 % reflected at normal incidence
 
 

@@ -18,7 +18,7 @@ using Output = nb::ndarray<nb::numpy, float>;
 using Triple = std::tuple<float, float, float>;
 
 Vec3 vec(const Triple& t) { return {std::get<0>(t), std::get<1>(t), std::get<2>(t)}; }
-Triple triple(Rgb c) { return {c.r, c.g, c.b}; }
+Triple triple(Rgb c) { return {c.r(), c.g(), c.b()}; }
 Vec3 row(const Input& a, size_t i) { return {a(i, 0), a(i, 1), a(i, 2)}; }
 
 class ShadedPoint {
@@ -39,7 +39,7 @@ class ShadedPoint {
     for (size_t i = 0; i < wi.shape(0); ++i) {
       const LobeEval e = bsdf_.eval(wo_, row(wi, i));
       float* r = out.data() + 4 * i;
-      r[0] = e.value.r, r[1] = e.value.g, r[2] = e.value.b, r[3] = e.pdf_dir;
+      r[0] = e.value.r(), r[1] = e.value.g(), r[2] = e.value.b(), r[3] = e.pdf_dir;
     }
     return out;
   }
@@ -49,7 +49,8 @@ class ShadedPoint {
       const Vec3 x = row(u, i);
       const auto s = bsdf_.sample(wo_, {x.x, x.y}, x.z);
       if (!s) continue;
-      const float values[9] = {s->wi.x, s->wi.y, s->wi.z, s->value.r, s->value.g, s->value.b, s->pdf_dir, float(s->flags), s->roughness};
+      const float values[9] = {s->wi.x,      s->wi.y,    s->wi.z,         s->value.r(), s->value.g(),
+                               s->value.b(), s->pdf_dir, float(s->flags), s->roughness};
       std::copy(values, values + 9, out.data() + 9 * i);
     }
     return out;

@@ -79,11 +79,12 @@ nb::tuple sky(bool multiple, float sun_elevation, float sun_size, float altitude
     sun = multiple ? multiple_scattering_sun(sun_elevation, sun_size, a) : single_scattering_sun(sun_elevation, sun_size, a);
     pixels = new std::vector<float>();
     pixels->reserve(table.pixels.size() * 4);
-    for (const Rgb& c : table.pixels) pixels->insert(pixels->end(), {c.r, c.g, c.b, 1.0f});
+    for (const Rgb& c : table.pixels) pixels->insert(pixels->end(), {c.r(), c.g(), c.b(), 1.0f});
   }
   nb::capsule owner(pixels, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
   nb::ndarray<nb::numpy, float> array(pixels->data(), {size_t(table.height), size_t(table.width), 4}, owner);
-  return nb::make_tuple(array, nb::make_tuple(sun.bottom.r, sun.bottom.g, sun.bottom.b), nb::make_tuple(sun.top.r, sun.top.g, sun.top.b));
+  return nb::make_tuple(array, nb::make_tuple(sun.bottom.r(), sun.bottom.g(), sun.bottom.b()),
+                        nb::make_tuple(sun.top.r(), sun.top.g(), sun.top.b()));
 }
 
 // The 30 floats of a HosekWilkieSky.

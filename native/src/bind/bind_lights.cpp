@@ -53,8 +53,8 @@ class TestLights {
       float* row = data + 10 * i;
       row[9] = -1;
       if (!s) continue;
-      const float values[10] = {s->wi.x,       s->wi.y,       s->wi.z,    s->distance,        s->radiance.r,
-                                s->radiance.g, s->radiance.b, s->pdf_dir, float(s->is_delta), float(s->light)};
+      const float values[10] = {s->wi.x,         s->wi.y,         s->wi.z,    s->distance,        s->radiance.r(),
+                                s->radiance.g(), s->radiance.b(), s->pdf_dir, float(s->is_delta), float(s->light)};
       std::copy(values, values + 10, row);
     }
     return out;
@@ -67,7 +67,7 @@ class TestLights {
     for (size_t i = 0; i < wi.shape(0); ++i) {
       const LightQuery query = make_query(position, normal, i, transmission);
       const LightEval e = everything(query, {query.position, row_of(wi, i)}, visibility);
-      const float values[4] = {e.radiance.r, e.radiance.g, e.radiance.b, e.pdf_dir};
+      const float values[4] = {e.radiance.r(), e.radiance.g(), e.radiance.b(), e.pdf_dir};
       std::copy(values, values + 4, data + 4 * i);
     }
     return out;
@@ -95,12 +95,12 @@ class TestLights {
       row[9] = -1;
       if (!r) continue;
       const Vec3 o = r->ray.origin, d = r->ray.direction;
-      const float values[10] = {o.x, o.y, o.z, d.x, d.y, d.z, r->power.r, r->power.g, r->power.b, float(r->light)};
+      const float values[10] = {o.x, o.y, o.z, d.x, d.y, d.z, r->power.r(), r->power.g(), r->power.b(), float(r->light)};
       std::copy(values, values + 10, row);
       const auto s = lights_->arriving(*r, {o + d * along, -d, false, {}});
       if (!s) continue;
       const Rgb power = s->radiance / lights_->pdf_emit(r->light, o + d * along, -d);
-      row[10] = power.r, row[11] = power.g, row[12] = power.b, row[13] = s->pdf_dir;
+      row[10] = power.r(), row[11] = power.g(), row[12] = power.b(), row[13] = s->pdf_dir;
     }
     return out;
   }

@@ -86,7 +86,7 @@ Output make_output(size_t rows, size_t columns, float** data) {
   nb::capsule owner(*data, [](void* p) noexcept { delete[] static_cast<float*>(p); });
   return Output(*data, {rows, columns}, owner);
 }
-void store(float* row, Rgb c) { row[0] = c.r, row[1] = c.g, row[2] = c.b; }
+void store(float* row, Rgb c) { row[0] = c.r(), row[1] = c.g(), row[2] = c.b(); }
 Vec3 row_of(const Input& a, size_t i) { return {a(i, 0), a(i, 1), a(i, 2)}; }
 
 using Values = std::map<std::string, std::vector<float>>;
@@ -176,7 +176,7 @@ struct Mix {
   }
   std::vector<float> albedo(std::vector<float> wo) {
     const Rgb a = bsdf.albedo(vec(wo));
-    return {a.r, a.g, a.b};
+    return {a.r(), a.g(), a.b()};
   }
   static Vec3 vec(const std::vector<float>& v) { return {v.at(0), v.at(1), v.at(2)}; }
 };

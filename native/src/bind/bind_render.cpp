@@ -47,7 +47,7 @@ nb::ndarray<nb::numpy, float> emission_seen(const BoundScene& bound, nb::handle 
     } else {
       seen = scene.world_radiance(r.ray.direction, {});
     }
-    std::copy_n(&seen.r, 3, pixels->data() + 3 * i);
+    for (int k = 0; k < 3; ++k) (*pixels)[3 * i + size_t(k)] = seen[k];
   }
   scene.resources().camera = nullptr;
   return nb::ndarray<nb::numpy, float>(pixels->data(), {height, width, 3}, owner);

@@ -57,23 +57,49 @@ class Sampler {
     v ^= v >> 16, v ^= (v >> 8) & 0x00ff00ffu, v ^= (v >> 4) & 0x0f0f0f0fu, v ^= (v >> 2) & 0x33333333u;
     return v ^ ((v >> 1) & 0x55555555u);
   }
+  // One pair of one stream, by the pass with its bits reversed.
+  static void make_pair(uint32_t index, uint32_t key, uint32_t dimension, float& x, float& y) {
+    const uint32_t h = hash32(key ^ (dimension * 0x9e3779b9u));
+    uint32_t hx = h * 0x85ebca6bu + 0x3c6ef372u, hy = h * 0xc2b2ae35u + 0x1b873593u;
+    hx ^= hx >> 15, hy ^= hy >> 15;
+    const uint32_t shuffled = reverse_bits(permute(index, h));
+    x = to_unit_float(reverse_bits(permute(shuffled, hx)));
+    y = to_unit_float(reverse_bits(permute(sobol_1(shuffled), hy)));
+  }
   void fill() {
     const uint32_t first = dimension_ & ~kMask;
-    for (uint32_t k = 0; k < kBatch; ++k) {
-      const uint32_t h = hash32(key_ ^ ((first + k) * 0x9e3779b9u));
-      uint32_t hx = h * 0x85ebca6bu + 0x3c6ef372u, hy = h * 0xc2b2ae35u + 0x1b873593u;
-      hx ^= hx >> 15, hy ^= hy >> 15;
-      const uint32_t shuffled = reverse_bits(permute(index_, h));
-      x_[k] = to_unit_float(reverse_bits(permute(shuffled, hx)));
-      y_[k] = to_unit_float(reverse_bits(permute(sobol_1(shuffled), hy)));
-    }
+    for (uint32_t k = 0; k < kBatch; ++k) make_pair(index_, key_, first + k, x_[k], y_[k]);
   }
 
+  template <int N>
+  friend class SamplerRow;
   static constexpr uint32_t kBatch = 4, kMask = kBatch - 1;  // what one vector register holds
   uint32_t index_ = 0, key_ = 0, dimension_ = 0;
   bool has_spare_ = false;
   float spare_ = 0;
   float x_[kBatch], y_[kBatch];
+};
+
+// The samplers of N streams in a row, and their first pairs several at a time: what next_2d of each would give.
+template <int N>
+class SamplerRow {
+ public:
+  SamplerRow(uint32_t seed, uint32_t first_stream, uint32_t index) : index_(reverse_bits(index)) {
+    for (int i = 0; i < N; ++i) keys_[i] = hash_combine(seed, first_stream + uint32_t(i));
+  }
+  void pairs(uint32_t dimension, float* x, float* y) const {
+    for (int i = 0; i < N; ++i) Sampler::make_pair(index_, keys_[i], dimension, x[i], y[i]);
+  }
+  // That of stream i, past its first batch, which is the camera's.
+  Sampler sampler(int i) const {
+    Sampler s;
+    s.index_ = index_, s.key_ = keys_[i];
+    s.jump_to(1);
+    return s;
+  }
+
+ private:
+  uint32_t index_, keys_[N];
 };
 
 }  // namespace gi

@@ -1,6 +1,8 @@
 // Small vectors, colours and frames. Lengths are metres, colours scene-linear RGB. Leaves out anything Embree or Python.
 #pragma once
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -58,32 +60,51 @@ inline Vec3 normalize_or(Vec3 a, Vec3 fallback) {
 }
 inline Vec3 normalize(Vec3 a) { return normalize_or(a, {0, 0, 0}); }
 
-// Scene-linear RGB: radiance, throughput, albedo.
-struct Rgb {
-  float r = 0, g = 0, b = 0;
+// Scene-linear RGB: radiance, throughput, albedo. The channels lie side by side in one vector register, of which the fourth lane
+// means nothing, so that one instruction does all three.
+class Rgb {
+ public:
+  using Lanes = float __attribute__((vector_size(16)));
   Rgb() = default;
-  constexpr Rgb(float r_, float g_, float b_) : r(r_), g(g_), b(b_) {}
-  explicit constexpr Rgb(float v) : r(v), g(v), b(v) {}
-  explicit Rgb(Vec3 v) : r(v.x), g(v.y), b(v.z) {}
-  float operator[](int i) const { return (&r)[i]; }
-  float& operator[](int i) { return (&r)[i]; }
+  constexpr Rgb(float r, float g, float b) : lanes_{r, g, b, 0.0f} {}
+  explicit constexpr Rgb(float v) : lanes_{v, v, v, v} {}
+  explicit constexpr Rgb(Lanes lanes) : lanes_(lanes) {}
+  explicit Rgb(Vec3 v) : Rgb(v.x, v.y, v.z) {}
+  float r() const { return lanes_[0]; }
+  float g() const { return lanes_[1]; }
+  float b() const { return lanes_[2]; }
+  float operator[](int i) const { return lanes_[i]; }
+  float& operator[](int i) { return reinterpret_cast<float*>(&lanes_)[i]; }
+  Lanes lanes() const { return lanes_; }
+
+ private:
+  Lanes lanes_{};
 };
-inline Rgb operator+(Rgb a, Rgb b) { return {a.r + b.r, a.g + b.g, a.b + b.b}; }
-inline Rgb operator-(Rgb a, Rgb b) { return {a.r - b.r, a.g - b.g, a.b - b.b}; }
-inline Rgb operator*(Rgb a, Rgb b) { return {a.r * b.r, a.g * b.g, a.b * b.b}; }
-inline Rgb operator*(Rgb a, float s) { return {a.r * s, a.g * s, a.b * s}; }
+inline Rgb operator+(Rgb a, Rgb b) { return Rgb(a.lanes() + b.lanes()); }
+inline Rgb operator-(Rgb a, Rgb b) { return Rgb(a.lanes() - b.lanes()); }
+inline Rgb operator*(Rgb a, Rgb b) { return Rgb(a.lanes() * b.lanes()); }
+inline Rgb operator*(Rgb a, float s) { return Rgb(a.lanes() * s); }
 inline Rgb operator*(float s, Rgb a) { return a * s; }
+inline Rgb operator/(Rgb a, Rgb b) { return Rgb(a.lanes() / b.lanes()); }
 inline Rgb operator/(Rgb a, float s) { return a * (1.0f / s); }
 inline Rgb& operator+=(Rgb& a, Rgb b) { return a = a + b; }
 inline Rgb& operator*=(Rgb& a, Rgb b) { return a = a * b; }
 inline Rgb& operator*=(Rgb& a, float s) { return a = a * s; }
-inline float max_component(Rgb a) { return std::max({a.r, a.g, a.b}); }
-inline float average(Rgb a) { return (a.r + a.g + a.b) * (1.0f / 3.0f); }
-inline float luminance(Rgb a) { return 0.2126f * a.r + 0.7152f * a.g + 0.0722f * a.b; }  // Rec. 709 primaries
-inline bool is_black(Rgb a) { return a.r == 0 && a.g == 0 && a.b == 0; }
-inline bool is_finite(Rgb a) { return std::isfinite(a.r) && std::isfinite(a.g) && std::isfinite(a.b); }
+inline float max_component(Rgb a) { return std::max({a.r(), a.g(), a.b()}); }
+inline float average(Rgb a) { return (a.r() + a.g() + a.b()) * (1.0f / 3.0f); }
+inline float luminance(Rgb a) { return 0.2126f * a.r() + 0.7152f * a.g() + 0.0722f * a.b(); }  // Rec. 709 primaries
+inline bool is_black(Rgb a) {
+  const auto bits = std::bit_cast<std::array<uint64_t, 2>>(a.lanes());
+  return ((bits[0] | uint32_t(bits[1])) & 0x7fffffff7fffffffu) == 0;  // of either sign
+}
+inline bool is_finite(Rgb a) { return is_black(a - a); }
+inline Rgb max(Rgb a, Rgb b) { return Rgb(a.lanes() < b.lanes() ? b.lanes() : a.lanes()); }  // a where that is not a number
+inline Rgb min(Rgb a, Rgb b) { return Rgb(b.lanes() < a.lanes() ? b.lanes() : a.lanes()); }
+inline Rgb positive(Rgb a) { return max(a, Rgb()); }
+inline Rgb clamp01(Rgb a) { return min(positive(a), Rgb(1.0f)); }
+inline Rgb abs(Rgb a) { return max(a, Rgb() - a); }
 inline Rgb lerp(Rgb a, Rgb b, float t) { return a * (1.0f - t) + b * t; }
-inline Rgb exp(Rgb a) { return {std::exp(a.r), std::exp(a.g), std::exp(a.b)}; }
+inline Rgb exp(Rgb a) { return {std::exp(a.r()), std::exp(a.g()), std::exp(a.b())}; }
 
 // Orthonormal right-handed frame; z is the normal. [Duff et al. 2017, "Building an orthonormal basis, revisited"]
 struct Frame {

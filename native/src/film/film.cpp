@@ -21,11 +21,11 @@ struct PassRule {
 namespace {
 
 void add_number(float x, float* sum) { *sum += std::isfinite(x) ? x : 0.0f; }
-void add_rgb(Rgb c, float* sum) { add_number(c.r, sum), add_number(c.g, sum + 1), add_number(c.b, sum + 2); }
+void add_rgb(Rgb c, float* sum) { add_number(c.r(), sum), add_number(c.g(), sum + 1), add_number(c.b(), sum + 2); }
 void add_vec(Vec3 v, float* sum) { add_number(v.x, sum), add_number(v.y, sum + 1), add_number(v.z, sum + 2); }
 void add_combined(const PixelSample& s, float exposure, float* sum) {  // known to be finite
   const Rgb c = s.radiance * exposure;
-  sum[0] += c.r, sum[1] += c.g, sum[2] += c.b, sum[3] += s.alpha;
+  sum[0] += c.r(), sum[1] += c.g(), sum[2] += c.b(), sum[3] += s.alpha;
 }
 
 const PassRule kPassRules[] = {
@@ -76,33 +76,35 @@ Film::Film(FilmSpec spec) : spec_(std::move(spec)), filter_(spec_.filter, spec_.
     has_data_passes_ = has_data_passes_ || rule->keep != Keep::kLight;
     layers_.push_back({rule, std::vector<float>(pixels * size_t(rule->channels), 0.0f)});
   }
-  count_.assign(pixels, 0), light_count_.assign(pixels, 0);
-  luminance_sum_.assign(pixels, 0.0f);
-  luminance_square_sum_.assign(pixels, 0.0f);
+  moments_.resize(pixels);
+}
+
+bool Film::add_moments(Moments& m, const PixelSample& s) {
+  ++m.count;
+  const Rgb light = s.radiance * spec_.exposure;
+  if (!is_finite(light) || !std::isfinite(s.alpha)) {
+    ++bad_samples_;  // its light is left out of sums and counts; what it hit is still good
+    return false;
+  }
+  ++m.light_count;
+  const float y = luminance(light);
+  m.luminance += y, m.luminance_square += y * y;
+  return true;
 }
 
 void Film::add_row(int tile, int y, int pass, const PixelSample* samples) {
   const Tile& t = tiles_[size_t(tile)];
+  const int width = t.x1 - t.x0;
+  const size_t first = size_t(y) * size_t(spec_.region_width()) + size_t(t.x0);
   const std::lock_guard lock(tile_mutex_[size_t(tile)]);
-  const size_t first = size_t(y) * size_t(spec_.region_width());
-  for (int x = t.x0; x < t.x1; ++x) add_sample(first + size_t(x), pass == 0, *samples++);
-}
-
-void Film::add_sample(size_t pixel, bool first, const PixelSample& s) {
-  ++count_[pixel];
-  const bool good = is_finite(s.radiance * spec_.exposure) && std::isfinite(s.alpha);
-  if (good) {
-    ++light_count_[pixel];
-    const float y = luminance(s.radiance) * spec_.exposure;
-    luminance_sum_[pixel] += y;
-    luminance_square_sum_[pixel] += y * y;
-  } else {
-    ++bad_samples_;  // its light is left out of sums and counts; what it hit is still good
-  }
+  bool good[kTileSize];
+  for (int i = 0; i < width; ++i) good[i] = add_moments(moments_[first + size_t(i)], samples[i]);
   for (Layer& layer : layers_) {
-    const Keep keep = layer.rule->keep;
-    if ((keep == Keep::kLight && !good) || (keep == Keep::kFirst && !first)) continue;
-    layer.rule->add(s, spec_.exposure, layer.sum.data() + pixel * size_t(layer.rule->channels));
+    const PassRule& rule = *layer.rule;
+    if (rule.keep == Keep::kFirst && pass > 0) continue;
+    float* sum = layer.sum.data() + first * size_t(rule.channels);
+    for (int i = 0; i < width; ++i, sum += rule.channels)
+      if (good[i] || rule.keep != Keep::kLight) rule.add(samples[i], spec_.exposure, sum);
   }
 }
 
@@ -113,7 +115,9 @@ void Film::read(const std::string& pass, float* out) const {
     if (pass == l.rule->name) layer = &l;
   require(layer || pass == kSampleCount, "the pass '" + pass + "' is not part of this render");
   const bool mean = layer && layer->rule->keep != Keep::kFirst;
-  const std::vector<uint32_t>& count = layer && layer->rule->keep == Keep::kLight ? light_count_ : count_;
+  const auto count = [&, light = layer && layer->rule->keep == Keep::kLight](size_t i) {
+    return light ? moments_[i].light_count : moments_[i].count;
+  };
   for (size_t tile = 0; tile < tiles_.size(); ++tile) {
     const Tile& t = tiles_[tile];
     const std::lock_guard lock(tile_mutex_[tile]);
@@ -121,11 +125,11 @@ void Film::read(const std::string& pass, float* out) const {
       for (int x = t.x0; x < t.x1; ++x) {
         const size_t pixel = size_t(y) * w + size_t(x);
         if (!layer) {
-          out[pixel] = float(count_[pixel]);
+          out[pixel] = float(count(pixel));
           continue;
         }
         const size_t c = size_t(layer->rule->channels);
-        const float scale = !mean ? 1.0f : count[pixel] ? 1.0f / float(count[pixel]) : 0.0f;
+        const float scale = !mean ? 1.0f : count(pixel) ? 1.0f / float(count(pixel)) : 0.0f;
         for (size_t k = 0; k < c; ++k) out[pixel * c + k] = layer->sum[pixel * c + k] * scale;
       }
     }
@@ -133,18 +137,19 @@ void Film::read(const std::string& pass, float* out) const {
 }
 
 float Film::relative_error() const {
-  const size_t pixels = count_.size();
+  const size_t pixels = moments_.size();
   double total = 0;
-  for (size_t i = 0; i < pixels; ++i) {
-    if (count_[i] < 2) return kInf;
-    total += luminance_sum_[i] / float(std::max(light_count_[i], 1u));
+  for (const Moments& m : moments_) {
+    if (m.count < 2) return kInf;
+    total += m.luminance / float(std::max(m.light_count, 1u));
   }
   const float floor = std::max(float(0.1 * total / double(pixels)), 1e-12f);
   std::vector<float> error(pixels);
   for (size_t i = 0; i < pixels; ++i) {
-    if (light_count_[i] < 2) continue;  // no light to judge by: it would keep the render from ending
-    const double n = light_count_[i], mean = luminance_sum_[i] / n;
-    const double variance = std::max(0.0, luminance_square_sum_[i] / n - mean * mean) * n / (n - 1);
+    const Moments& m = moments_[i];
+    if (m.light_count < 2) continue;  // no light to judge by: it would keep the render from ending
+    const double n = m.light_count, mean = m.luminance / n;
+    const double variance = std::max(0.0, m.luminance_square / n - mean * mean) * n / (n - 1);
     error[i] = float(std::sqrt(variance / n) / std::max(std::abs(mean), double(floor)));
   }
   const size_t rank = std::min(pixels - 1, size_t(0.95 * double(pixels)));
@@ -153,7 +158,7 @@ float Film::relative_error() const {
 }
 
 size_t Film::memory_bytes() const {
-  size_t bytes = count_.size() * 16;
+  size_t bytes = moments_.size() * sizeof(Moments);
   for (const Layer& layer : layers_) bytes += layer.sum.size() * 4;
   return bytes;
 }

@@ -73,15 +73,19 @@ class Film {
     const PassRule* rule;
     std::vector<float> sum;
   };
-  void add_sample(size_t pixel, bool first, const PixelSample& sample);
+  // Of a pixel: how many samples, how many whose light is a finite number, and the moments of these.
+  struct Moments {
+    uint32_t count = 0, light_count = 0;
+    float luminance = 0, luminance_square = 0;
+  };
+  bool add_moments(Moments& moments, const PixelSample& sample);  // whether its light is a finite number
 
   FilmSpec spec_;
   PixelFilter filter_;
   std::vector<Tile> tiles_;
   std::vector<Layer> layers_;
   bool has_data_passes_ = false;
-  std::vector<uint32_t> count_, light_count_;  // samples; those whose light is a finite number
-  std::vector<float> luminance_sum_, luminance_square_sum_;
+  std::vector<Moments> moments_;
   std::unique_ptr<std::mutex[]> tile_mutex_;
   std::atomic<uint64_t> bad_samples_{0};
 };

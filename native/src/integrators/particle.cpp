@@ -33,7 +33,7 @@ struct Ledger {
   void add(const Ledger& o) { emitted += o.emitted, absorbed += o.absorbed, escaped += o.escaped, created += o.created; }
 };
 
-double sum(Rgb c) { return double(c.r) + double(c.g) + double(c.b); }
+double sum(Rgb c) { return double(c.r()) + double(c.g()) + double(c.b()); }
 
 // Bounces on a particle's way to a surface, counted as a path from the eye would: there the surface itself is the first bounce, and
 // the one nearest to the light only receives.

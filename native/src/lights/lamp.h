@@ -30,7 +30,7 @@ inline Shape make_shape(const LampData& lamp) {
   return PointLight(lamp);
 }
 
-inline float magnitude(Rgb c) { return luminance({std::abs(c.r), std::abs(c.g), std::abs(c.b)}); }
+inline float magnitude(Rgb c) { return luminance(abs(c)); }
 
 inline void bound(const PointLight& light, LightBounds& b) {
   const Vec3 r = Vec3{1, 1, 1} * light.radius;

@@ -179,6 +179,7 @@ struct LightSet::Impl {
   // What a lamp's node program makes of its light towards −wi; 1 without a program.
   Rgb lamp_program(const Lamp& lamp, Vec3 origin, Vec3 wi, float distance, const PathState& path) const {
     if (lamp.data->program < 0) return Rgb(1.0f);
+    if (const auto& constant = scene.material(lamp.data->program).program.constant_emission()) return *constant;
     ShadingPoint p;
     p.wo = -wi;
     p.position = std::isfinite(distance) ? origin + wi * distance : wi;

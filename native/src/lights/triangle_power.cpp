@@ -18,7 +18,7 @@ struct Candidate {
 };
 
 float magnitude(Rgb c) {
-  const float m = luminance({std::abs(c.r), std::abs(c.g), std::abs(c.b)});
+  const float m = luminance(abs(c));
   return std::isfinite(m) ? m : 0.0f;
 }
 

@@ -28,7 +28,6 @@ struct Camera {
 
   // (x, y) in [0, 1]² over the full frame, origin at the lower left; `pixel` is the size of a pixel in those units.
   CameraRay sample(Vec2 film, Vec2 pixel, Vec2 u_lens) const {
-    if (kind == Kind::kPerspective && !(aperture_radius > 0.0f)) return sample_pinhole(film, pixel);
     CameraRay r;
     Vec3 origin, direction;
     float start = clip_start, end = clip_end;
@@ -43,7 +42,7 @@ struct Camera {
       r.spread = pixel_radius(pixel);
     } else if (kind == Kind::kOrthographic) {
       origin = {x, y, 0.0f}, direction = {0, 0, -1};
-      if (aperture_radius > 0.0f) {
+      if (has_lens()) {
         const Vec2 lens = sample_aperture(u_lens);
         const Vec3 focus = origin + focus_distance * direction;
         origin += Vec3{lens.x, lens.y, 0.0f};
@@ -55,7 +54,7 @@ struct Camera {
     } else {  // equirectangular: the middle of the frame looks ahead
       const float phi = lerp(longitude[0], longitude[1], film.x), theta = lerp(latitude[0], latitude[1], film.y);
       direction = {std::sin(phi) * std::cos(theta), std::sin(theta), -std::cos(phi) * std::cos(theta)};
-      if (aperture_radius > 0.0f) {
+      if (has_lens()) {
         const Vec3 focus = direction * focus_distance;
         const Vec2 lens = sample_aperture(u_lens);
         const Frame frame = Frame::from_normal_and_tangent(direction, Vec3{-direction.z, 0, direction.x});
@@ -71,6 +70,28 @@ struct Camera {
     return r;
   }
 
+  bool has_lens() const { return aperture_radius > 0.0f; }
+  bool is_pinhole() const { return kind == Kind::kPerspective && !has_lens(); }
+  // As N calls of `sample`, for the commonest camera: several at a time, and without what it has no need of.
+  template <int N>
+  void sample_pinhole(const float* x, const float* y, Vec2 pixel, CameraRay* rays) const {
+    const Affine& m = to_world;
+    float dx[N], dy[N], dz[N], norm[N];
+    for (int i = 0; i < N; ++i) {
+      const float u = lerp(left, right, x[i]), v = lerp(bottom, top, y[i]);
+      dx[i] = m.m[0][0] * u + m.m[0][1] * v - m.m[0][2];
+      dy[i] = m.m[1][0] * u + m.m[1][1] * v - m.m[1][2];
+      dz[i] = m.m[2][0] * u + m.m[2][1] * v - m.m[2][2];
+      norm[i] = std::sqrt(dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i]);
+    }
+    const Vec3 origin = m.translation();
+    const float spread = pixel_radius(pixel);
+    for (int i = 0; i < N; ++i) {
+      const Vec3 d{dx[i], dy[i], dz[i]};
+      rays[i] = {{origin + d * clip_start, d / norm[i], 0.0f, (clip_end - clip_start) * norm[i]}, spread, spread * clip_start * norm[i]};
+    }
+  }
+
   // Distance along the camera's axis: Blender's Depth pass. Panoramas measure along the ray.
   float depth(Vec3 position) const {
     const Vec3 d = position - to_world.translation();
@@ -79,14 +100,6 @@ struct Camera {
 
  private:
   float pixel_radius(Vec2 pixel) const { return 0.5f * std::max(std::abs(right - left) * pixel.x, std::abs(top - bottom) * pixel.y); }
-
-  // The commonest camera: as `sample`, without what it has no need of.
-  CameraRay sample_pinhole(Vec2 film, Vec2 pixel) const {
-    const Vec3 direction = to_world.vector({lerp(left, right, film.x), lerp(bottom, top, film.y), -1.0f});
-    const float norm = length(direction), start = clip_start * norm, spread = pixel_radius(pixel);
-    return {
-        {to_world.translation() + direction * clip_start, direction / norm, 0.0f, (clip_end - clip_start) * norm}, spread, spread * start};
-  }
 
   Vec2 sample_aperture(Vec2 u) const {
     Vec2 lens;

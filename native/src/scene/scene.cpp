@@ -307,10 +307,14 @@ Rgb Scene::world_radiance(Vec3 direction, const PathState& path) const {
   return run_emission(data_.world.program, point);
 }
 
+namespace {
+std::atomic<size_t> threads_seen{0};
+constinit thread_local size_t my_counter = 0;  // from 1 on; 0: not yet given
+}  // namespace
+
 void Scene::count_ray() const {
-  static std::atomic<size_t> threads{0};
-  static thread_local const size_t mine = threads++ % kRayCounters;
-  std::atomic<uint64_t>& counter = rays_[mine].value;
+  if (my_counter == 0) my_counter = 1 + threads_seen++ % kRayCounters;
+  std::atomic<uint64_t>& counter = rays_[my_counter - 1].value;
   counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
 }
 

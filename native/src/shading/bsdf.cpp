@@ -45,7 +45,7 @@ void blur_lobe(Lobe& lobe, float alpha) {
 }  // namespace
 
 Bsdf::Entry* Bsdf::new_entry(Rgb weight, uint8_t flags, const Frame& frame) {
-  const Rgb w{std::max(weight.r, 0.0f), std::max(weight.g, 0.0f), std::max(weight.b, 0.0f)};
+  const Rgb w = positive(weight);
   if (!(average(w) >= kLeastWeight) || !is_finite(w) || count_ == kMaxLobes) return nullptr;
   const uint8_t left = flags & ~sides_without(flags, without_);
   if (!(left & (kReflection | kTransmission))) return nullptr;

@@ -5,6 +5,8 @@
 
 namespace gi {
 
+enum Distribution { kGgx, kBeckmann, kAshikhminShirley, kMultiscatterGgx };  // what immediates mean by them
+
 // Adds a lobe about normal `n`, with `tangent` as the frame's x axis unless it is zero.
 template <class L>
 void add_lobe(ShadeState& s, Rgb weight, const L& lobe, Vec3 n, Vec3 tangent, const Rgb* albedo = nullptr) {
@@ -17,7 +19,8 @@ void add_lobe(ShadeState& s, Rgb weight, const L& lobe, Vec3 n) {
 
 // Lambert, or Oren-Nayar where it is rough. `color` is the albedo whose multiple scattering is kept.
 inline void add_diffuse(ShadeState& s, Rgb weight, Rgb color, float roughness, Vec3 n) {
-  if (roughness < 1e-5f) return add_lobe(s, weight, Lambert{}, n);
+  const Rgb white(1.0f);
+  if (roughness < 1e-5f) return s.bsdf->add(weight, Lambert{}, Frame::from_normal(n), &white);
   add_lobe(s, weight, OrenNayar(color, roughness), n);
 }
 
@@ -50,11 +53,9 @@ inline Anisotropy anisotropy(float roughness, float amount, float rotation, Vec3
 // that reflects most decides, so that no hue is made by layering.
 inline Rgb under_layer(Rgb weight, Rgb albedo) {
   float most = 0.0f;
-  for (int i = 0; i < 3; ++i) most = std::max(most, safe_divide(albedo[i], weight[i]));
+  const Rgb share = albedo / weight;
+  for (int i = 0; i < 3; ++i) most = std::max(most, weight[i] != 0.0f ? share[i] : 0.0f);
   return weight * clamp01(1.0f - most);
 }
-
-inline Rgb positive(Rgb c) { return {std::max(c.r, 0.0f), std::max(c.g, 0.0f), std::max(c.b, 0.0f)}; }
-inline Rgb clamped(Rgb c) { return {clamp01(c.r), clamp01(c.g), clamp01(c.b)}; }
 
 }  // namespace gi

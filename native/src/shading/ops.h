@@ -13,5 +13,6 @@ std::span<const Op> input_ops();
 std::span<const Op> normal_ops();
 std::span<const Op> texture_ops();
 std::span<const Op> closure_ops();
+std::span<const Op> principled_ops();
 
 }  // namespace gi

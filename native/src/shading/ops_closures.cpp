@@ -2,7 +2,6 @@
 // weight that Mix Shader leaves. A zero vector for a normal or a tangent means "not linked". Leaves out volumes and hair.
 #include "shading/closures.h"
 #include "shading/ops.h"
-#include "shading/principled.h"
 
 namespace gi {
 namespace {
@@ -52,8 +51,6 @@ void toon(const Operands& o, ShadeState& s) {
   if (!s.bsdf) return;
   add_lobe(s, o.c(1) * o.f(0), Toon(o.f(2), o.f(3), o.imm(5) != 0), normal_or_shading(s, o.v(4)));
 }
-
-enum Distribution { kGgx, kBeckmann, kAshikhminShirley, kMultiscatterGgx };  // the immediates' meaning
 
 // A GGX or Beckmann lobe made by `make<LobeType>()`. Only Multiscatter GGX gets back what single bounces lose.
 template <class Make>
@@ -106,58 +103,11 @@ void metallic(const Operands& o, ShadeState& s) {
   if (!s.bsdf) return;
   const bool physical = o.imm(11) != 0;
   const Fresnel bare =
-      physical ? Fresnel::conductor(positive(o.c(1)), positive(o.c(2))) : Fresnel::f82_tint(clamped(o.c(1)), clamped(o.c(2)));
+      physical ? Fresnel::conductor(positive(o.c(1)), positive(o.c(2))) : Fresnel::f82_tint(clamp01(o.c(1)), clamp01(o.c(2)));
   const Fresnel f = bare.with_film(o.f(8), std::max(o.f(9), 1e-5f));
   const Vec3 n = normal_or_shading(s, o.v(6)), tangent = o.v(7);
   const Anisotropy a = anisotropy(clamp01(o.f(3)), clamp01(o.f(4)), o.f(5), n, tangent);
   add_facets(s, Rgb(o.f(0)), o.imm(10), visible_normal(s, n), a.tangent, [&]<class L>() { return L::reflection(a.alpha_x, a.alpha_y, f); });
-}
-
-// Operands one after the other, for the ops that have many.
-struct Reader {
-  const Operands& o;
-  int i = 0;
-  float f() { return o.f(i++); }
-  float unit() { return clamp01(o.f(i++)); }
-  float at_least(float low) { return std::max(o.f(i++), low); }
-  Vec3 v() { return o.v(i++); }
-  Rgb color() { return positive(o.c(i++)); }
-};
-
-PrincipledTop read_top(Reader& r) {  // coat: weight, roughness, ior, tint, normal; sheen: weight, roughness, tint
-  PrincipledTop t;
-  t.coat_weight = r.at_least(0.0f), t.coat_roughness = r.unit(), t.coat_ior = r.at_least(1.0f);
-  t.coat_tint = r.color(), t.coat_normal = r.v();
-  t.sheen_weight = r.at_least(0.0f), t.sheen_roughness = r.unit(), t.sheen_tint = r.color();
-  return t;
-}
-
-void principled(const Operands& o, ShadeState& s) {
-  if (!s.bsdf) return;
-  Reader r{o};
-  Principled p;
-  const float weight = r.f() * r.unit();  // mix, alpha
-  p.normal = normal_or_shading(s, r.v());
-  p.top = read_top(r);
-  p.base_color = r.color(), p.metallic = r.unit(), p.roughness = r.unit(), p.ior = r.at_least(1e-5f);
-  p.thin_wall = r.f() != 0.0f;
-  p.diffuse_roughness = r.unit(), p.subsurface_weight = r.unit(), p.subsurface_anisotropy = r.f();
-  p.specular_level = r.at_least(0.0f), p.specular_tint = r.color();
-  p.anisotropic = r.unit(), p.anisotropic_rotation = r.f(), p.tangent = r.v();
-  p.transmission = r.unit(), p.film_thickness = r.f(), p.film_ior = r.at_least(1e-5f);
-  p.preserve_energy = o.imm(r.i) == kMultiscatterGgx;
-  add_principled(s, p, Rgb(weight));
-}
-
-// The emission of a Principled BSDF lies under its coat and sheen.
-void principled_emission(const Operands& o, ShadeState& s) {
-  if (!s.bsdf) return;
-  Reader r{o};
-  const float weight = r.f() * r.unit();
-  const Vec3 n = normal_or_shading(s, r.v());
-  const PrincipledTop top = read_top(r);
-  const Rgb color = Rgb(r.v()), through = add_top_layers(s, top, n, Rgb(weight), false);
-  s.bsdf->emission += color * through * r.f();
 }
 
 const Op kOps[] = {
@@ -175,8 +125,6 @@ const Op kOps[] = {
     {"refraction", "", "fvffv", 1, OpKind::kClosure, refraction, kAddsLobe},
     {"glass", "", "fvffvff", 1, OpKind::kClosure, glass, kAddsLobe},
     {"metallic", "", "fvvfffvvff", 2, OpKind::kClosure, metallic, kAddsLobe},
-    {"principled", "", "ffvfffvvffvvffffffffvffvfff", 1, OpKind::kClosure, principled, kAddsLobe},
-    {"principled_emission", "", "ffvfffvvffvvf", 0, OpKind::kClosure, principled_emission, kAddsEmission | kSeesPoint},
 };
 
 }  // namespace

@@ -73,7 +73,7 @@ const Op kOps[] = {
     {"map_range", "f", "ffffff", 2, kPure, map_range},
     {"clamp_minmax", "f", "fff", 0, kPure, float_op3<clamp_to>},
     {"clamp_range", "f", "fff", 0, kPure, clamp_range},
-    {"saturate", "f", "f", 0, kPure, float_op1<clamp01>},
+    {"saturate", "f", "f", 0, kPure, float_op1<[](float a) { return clamp01(a); }>},
     {"mix_float", "f", "fff", 0, kPure, mix_float},
     {"float_curve", "f", "ff", 5, kPure, float_curve, 0, curve_fits<1>},
     {"math_add", "f", "ff", 0, kPure, float_op2<[](float a, float b) { return a + b; }>},

@@ -28,7 +28,7 @@ void noise(const Operands& a, ShadeState&) {
   const float scale = a.f(4);
   with_dimensions(a.imm(11), [&]<int N>() {
     const Rgb c = noise_texture(coordinates<N>(a.v(2), a.f(3)) * scale, s, a.f(10), a.imm(14) != 0);
-    a.set(0, c.r), a.set(1, c);
+    a.set(0, c.r()), a.set(1, c);
   });
 }
 
@@ -148,9 +148,16 @@ void environment_texture(const Operands& a, ShadeState& s) {
 // Reads a struct of floats from the program's tables.
 template <class T>
 T from_table(const ShadeState& s, int offset) {
+  static_assert(std::is_trivially_copyable_v<T> && alignof(T) == alignof(float));
   T value;
   std::memcpy(static_cast<void*>(&value), s.tables + offset, sizeof(T));
   return value;
+}
+
+// Whether the tables hold a T at the offset that immediate I gives.
+template <class T, int I>
+bool table_has(const int32_t* immediates, size_t tables) {
+  return immediates[I] >= 0 && size_t(immediates[I]) + sizeof(T) / sizeof(float) <= tables;
 }
 
 // sky(colour; direction; image, offset of a SkyDisc)
@@ -159,7 +166,7 @@ void sky_texture(const Operands& a, ShadeState& s) {
   const SkyDisc disc = from_table<SkyDisc>(s, a.imm(3));
   const Rgb sky = lookup(s, a.imm(2), sky_coordinates(d, disc.rotation), Interpolation::kLinear, Extension::kExtend, false).color;
   const Rgb sum = sky + sun_disc(d, disc);
-  a.set(0, Rgb{std::max(sum.r, 0.0f), std::max(sum.g, 0.0f), std::max(sum.b, 0.0f)});
+  a.set(0, positive(sum));
 }
 
 // sky_preetham(colour; direction; offset of a PreethamSky)
@@ -186,9 +193,9 @@ constexpr Op kTextureOps[] = {
     {"image", "vf", "v", 5, OpKind::kContext, image_texture},
     {"image_box", "vf", "vfv", 4, OpKind::kContext, image_box_texture},
     {"environment", "vf", "v", 3, OpKind::kContext, environment_texture},
-    {"sky", "v", "v", 2, OpKind::kContext, sky_texture},
-    {"sky_preetham", "v", "v", 1, OpKind::kContext, preetham_texture},
-    {"sky_hosek_wilkie", "v", "v", 1, OpKind::kContext, hosek_wilkie_texture},
+    {"sky", "v", "v", 2, OpKind::kContext, sky_texture, 0, table_has<SkyDisc, 1>},
+    {"sky_preetham", "v", "v", 1, OpKind::kContext, preetham_texture, 0, table_has<PreethamSky, 0>},
+    {"sky_hosek_wilkie", "v", "v", 1, OpKind::kContext, hosek_wilkie_texture, 0, table_has<SunnyHosekWilkieSky, 0>},
 };
 
 }  // namespace

@@ -160,7 +160,7 @@ const Op kOps[] = {
     {"rotate_rows", "v", "vvvvv", 1, kPure, rotate_rows},
     {"rotate_axis", "v", "vvvf", 0, kPure, rotate_axis},
     {"map_range_vector", "v", "vvvvvv", 2, kPure, map_range_vector},
-    {"saturate_vector", "v", "v", 0, kPure, component_op1<clamp01>},
+    {"saturate_vector", "v", "v", 0, kPure, component_op1<[](float a) { return clamp01(a); }>},
     {"mix_vector", "v", "fvv", 0, kPure, mix_vector},
     {"mix_vector_each", "v", "vvv", 0, kPure, component_op3<[](float t, float a, float b) { return mix(a, b, t); }>},
     {"curves", "v", "fv", 5, kPure, curves, 0, curve_fits<3>},

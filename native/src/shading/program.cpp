@@ -142,10 +142,14 @@ void Program::keep(const Wanted& wanted, const std::vector<float>& values, const
   std::vector<bool> used(values.size(), false);
   for_each_instruction(code_, [&](size_t at, const Instruction& i) {
     if (!wanted(at, i)) return;
-    const auto use = [&](int32_t slot, int width) { std::fill_n(used.begin() + slot, width, true); };
+    const auto use = [&](int32_t slot, int width) {
+      std::fill_n(used.begin() + slot, width, true);
+      for (int k = 1; k < width; ++k)  // or they would not stay together
+        require(known[size_t(slot + k)] == known[size_t(slot)], "the node program of '" + name_ + "' reads across two values");
+    };
     i.for_outputs(use), i.for_inputs(use);
   });
-  // Renumber: known registers first. Values of width 3 stay together because all three are known or none is.
+  // Renumber: known registers first. The three of a vector stay together because all are known or none is.
   std::vector<int32_t> place(values.size(), 0);
   std::vector<float> constants;
   int32_t next = 0;

@@ -44,7 +44,7 @@ struct Operands {
     float* p = registers + slots[i];
     p[0] = x.x, p[1] = x.y, p[2] = x.z;
   }
-  void set(int i, Rgb x) const { set(i, Vec3{x.r, x.g, x.b}); }
+  void set(int i, Rgb x) const { set(i, Vec3{x.r(), x.g(), x.b()}); }
 };
 
 using OpFunction = void (*)(const Operands&, ShadeState&);

@@ -7,33 +7,51 @@
 
 namespace gi {
 
-// Calls f(camera ray, sampler, sample to fill) for every pixel of the film, tile by tile in threads. Row by row within: all its
-// rays are made at once, which hides how long each takes.
+// The camera rays of a row of a tile, made at once: a row has as many lanes as it has pixels, whatever the tile's width.
+struct CameraRow {
+  static constexpr int kWidth = Film::kTileSize;
+  SamplerRow<kWidth> samplers;
+  CameraRay rays[kWidth];
+
+  // From pixel (x, y) of the full frame on, which is also what random numbers are keyed by: a region shows what the whole would.
+  CameraRow(const RenderContext& context, const Film& film, int x, int y, int pass)
+      : samplers(context.seed, uint32_t(y) * uint32_t(film.spec().width) + uint32_t(x), uint32_t(pass)) {
+    const Vec2 pixel{1.0f / float(film.spec().width), 1.0f / float(film.spec().height)};
+    float at_x[kWidth], at_y[kWidth], lens_x[kWidth], lens_y[kWidth];
+    samplers.pairs(0, at_x, at_y);
+    for (int i = 0; i < kWidth; ++i) {
+      const Vec2 offset = film.filter().sample({at_x[i], at_y[i]});
+      at_x[i] = (float(x + i) + 0.5f + offset.x) * pixel.x, at_y[i] = (float(y) + 0.5f + offset.y) * pixel.y;
+    }
+    const Camera& camera = context.camera;
+    if (camera.is_pinhole() && !context.lightmap) {
+      camera.sample_pinhole<kWidth>(at_x, at_y, pixel, rays);
+      return;
+    }
+    samplers.pairs(1, lens_x, lens_y);
+    if (!context.lightmap) {
+      for (int i = 0; i < kWidth; ++i) rays[i] = camera.sample({at_x[i], at_y[i]}, pixel, {lens_x[i], lens_y[i]});
+      return;
+    }
+    samplers.pairs(2, at_x, at_y);
+    for (int i = 0; i < kWidth; ++i)
+      if (context.lightmap->covers(x + i, y)) rays[i] = context.lightmap->sample(x + i, y, {lens_x[i], lens_y[i]}, {at_x[i], at_y[i]});
+  }
+};
+
+// Calls f(camera ray, sampler, sample to fill) for every pixel of the film, tile by tile in threads.
 template <class F>
 void for_each_pixel(const RenderContext& context, int pass, Film& film, const F& f) {
   const FilmSpec& spec = film.spec();
-  const Vec2 pixel{1.0f / float(spec.width), 1.0f / float(spec.height)};
   context.pool.for_each(int(film.tiles().size()), context.cancelled, [&](int index) {
     const Tile& tile = film.tiles()[size_t(index)];
     for (int y = tile.y0; y < tile.y1; ++y) {
-      Sampler samplers[Film::kTileSize];
-      CameraRay rays[Film::kTileSize];
-      PixelSample samples[Film::kTileSize];
-      const int width = tile.x1 - tile.x0;
-      for (int i = 0; i < width; ++i) {
-        // Keyed by the place in the full frame: a region shows what the whole picture would.
-        const int px = spec.x0 + tile.x0 + i, py = spec.y0 + y;
-        Sampler& sampler = samplers[i] = Sampler(context.seed, uint32_t(py) * uint32_t(spec.width) + uint32_t(px), uint32_t(pass));
-        const Vec2 offset = film.filter().sample(sampler.next_2d());
-        const Vec2 lens = sampler.next_2d();
-        const Vec2 at{(float(px) + 0.5f + offset.x) * pixel.x, (float(py) + 0.5f + offset.y) * pixel.y};
-        if (!context.lightmap)
-          rays[i] = context.camera.sample(at, pixel, lens);
-        else if (context.lightmap->covers(px, py))
-          rays[i] = context.lightmap->sample(px, py, lens, sampler.next_2d());
-      }
-      for (int i = 0; i < width; ++i) {
-        if (!context.lightmap || context.lightmap->covers(spec.x0 + tile.x0 + i, spec.y0 + y)) f(rays[i], samplers[i], samples[i]);
+      const CameraRow row(context, film, spec.x0 + tile.x0, spec.y0 + y, pass);
+      PixelSample samples[CameraRow::kWidth];
+      for (int i = 0; i < tile.x1 - tile.x0; ++i) {
+        if (context.lightmap && !context.lightmap->covers(spec.x0 + tile.x0 + i, spec.y0 + y)) continue;
+        Sampler sampler = row.samplers.sampler(i);
+        f(row.rays[i], sampler, samples[i]);
       }
       film.add_row(index, y, pass, samples);
     }

@@ -43,7 +43,8 @@ inline Vec3 offset_point(Vec3 p, Vec3 ng, Vec3 direction) {
 
 // Blender's Clamp Direct/Indirect: `limit` is the largest mean of the channels; 0 is off.
 inline Rgb clamp_contribution(Rgb value, float limit) {
-  const float sum = std::abs(value.r) + std::abs(value.g) + std::abs(value.b);
+  const Rgb size = abs(value);
+  const float sum = size.r() + size.g() + size.b();
   return limit > 0.0f && sum > 3.0f * limit ? value * (3.0f * limit / sum) : value;
 }
 

@@ -49,6 +49,7 @@ struct Fresnel {
   Rgb reflection_tint{1.0f}, transmission_tint{1.0f};
   ThinFilm film{};         // kSchlick along the real curve, kF82, kConductor
   float exponent = -1.0f;  // kSchlick: of (1 − cos); negative: follow the real curve of `ior` from f0 to f90
+  float lowest = 0, steepness = 1;  // of the real curve: its value head-on, and one over what is left to 1
 
   static Fresnel none(float ior = 1.0f) { return {.ior = ior}; }
   static Fresnel dielectric(float ior) { return {.model = Model::kDielectric, .ior = ior}; }
@@ -60,13 +61,16 @@ struct Fresnel {
   }
   // `transmission_tint` black for lobes that only reflect.
   static Fresnel schlick(float ior, Rgb f0, Rgb f90, Rgb reflection_tint, Rgb transmission_tint, float exponent = -1.0f) {
+    const float head_on = f0_from_ior(ior);
     return {.model = Model::kSchlick,
             .ior = ior,
-            .f0 = min_one(f0),
+            .f0 = clamp01(f0),
             .f90 = f90,
             .reflection_tint = reflection_tint,
             .transmission_tint = transmission_tint,
-            .exponent = exponent};
+            .exponent = exponent,
+            .lowest = head_on < 1.0f ? head_on : -1.0f,  // nothing between the two: f90 at once
+            .steepness = head_on < 1.0f ? 1.0f / (1.0f - head_on) : 1.0f};
   }
 
   Fresnel with_film(float thickness, float film_ior) const {
@@ -80,27 +84,23 @@ struct Fresnel {
   Rgb mean() const;
   static Rgb f82(float cos_i, Rgb f0, Rgb b) {
     const float s = clamp01(1.0f - cos_i), s5 = s * s * s * s * s;
-    return min_one(lerp(f0, Rgb(1.0f), s5) - b * (cos_i * s5 * s));
+    return clamp01(lerp(f0, Rgb(1.0f), s5) - b * (cos_i * s5 * s));
   }
 
  private:
-  static Rgb min_one(Rgb c) { return {clamp01(c.r), clamp01(c.g), clamp01(c.b)}; }
   float schlick_weight(float cos_h) const;
   Rgb film_dielectric(float cos_h) const;
   Rgb film_f82(float cos_h) const;
   Rgb film_conductor(float cos_h) const;
   static Rgb f82_mean(Rgb f0, Rgb b) { return lerp(f0, Rgb(1.0f), 1.0f / 21.0f) - b * (1.0f / 126.0f); }
   Rgb conductor_at(float c) const {
-    return {fresnel_conductor(c, f0.r, f90.r), fresnel_conductor(c, f0.g, f90.g), fresnel_conductor(c, f0.b, f90.b)};
+    return {fresnel_conductor(c, f0.r(), f90.r()), fresnel_conductor(c, f0.g(), f90.g()), fresnel_conductor(c, f0.b(), f90.b())};
   }
 };
 
 // How far from f0 to f90.
 inline float Fresnel::schlick_weight(float cos_h) const {
-  if (exponent < 0.0f) {
-    const float lowest = f0_from_ior(ior);
-    return lowest < 1.0f ? clamp01((fresnel_dielectric(cos_h, ior) - lowest) / (1.0f - lowest)) : 1.0f;
-  }
+  if (exponent < 0.0f) return clamp01((fresnel_dielectric(cos_h, ior) - lowest) * steepness);
   const float cos_t = safe_sqrt(1.0f - (1.0f - cos_h * cos_h) / (ior * ior));
   return std::pow(1.0f - (ior < 1.0f ? cos_t : cos_h), exponent);  // the wider of the two angles
 }
@@ -155,16 +155,15 @@ inline Rgb Fresnel::mean() const {
     case Model::kNone: return Rgb(1.0f);
     case Model::kDielectric: return reflection_tint * fresnel_dielectric_mean(ior);
     case Model::kSchlick: {
-      const float lowest = f0_from_ior(ior);
-      const float s = exponent < 0.0f ? clamp01((fresnel_dielectric_mean(ior) - lowest) / (1.0f - lowest))
-                                      : 2.0f / ((exponent + 3.0f) * exponent + 2.0f);
+      const float s =
+          exponent < 0.0f ? clamp01((fresnel_dielectric_mean(ior) - lowest) * steepness) : 2.0f / ((exponent + 3.0f) * exponent + 2.0f);
       return reflection_tint * lerp(f0, f90, s);
     }
     case Model::kF82: return f82_mean(f0, f90);
     case Model::kConductor: {  // through the F82 curve with the same values head-on and at cos θ = 1/7
       const Rgb head_on = conductor_at(1.0f), edge = conductor_at(1.0f / 7.0f);
       const float f = 6.0f / 7.0f, f5 = f * f * f * f * f;
-      return min_one(f82_mean(head_on, (lerp(head_on, Rgb(1.0f), f5) - edge) * (7.0f / (f5 * f))));
+      return clamp01(f82_mean(head_on, (lerp(head_on, Rgb(1.0f), f5) - edge) * (7.0f / (f5 * f))));
     }
   }
   return Rgb(1.0f);

@@ -24,13 +24,21 @@ float at_1d(const uint16_t* table, int n, float x) {
   const auto [i, t] = cell(x, n);
   return lerp(float(table[i]), float(table[i + 1]), t);
 }
+// Four neighbours of a table with rows of n.
+float bilinear(const uint16_t* p, int n, float tx, float ty) {
+  return lerp(lerp(float(p[0]), float(p[1]), tx), lerp(float(p[n]), float(p[n + 1]), tx), ty);
+}
 float at_2d(const uint16_t* table, int nx, int ny, float x, float y) {
-  const auto [i, t] = cell(y, ny);
-  return lerp(at_1d(table + i * nx, nx, x), at_1d(table + (i + 1) * nx, nx, x), t);
+  const auto [i, tx] = cell(x, nx);
+  const auto [j, ty] = cell(y, ny);
+  return bilinear(table + j * nx + i, nx, tx, ty);
 }
 float at_3d(const uint16_t* table, int n, float x, float y, float z) {
-  const auto [i, t] = cell(z, n);
-  return lerp(at_2d(table + i * n * n, n, n, x, y), at_2d(table + (i + 1) * n * n, n, n, x, y), t);
+  const auto [i, tx] = cell(x, n);
+  const auto [j, ty] = cell(y, n);
+  const auto [k, tz] = cell(z, n);
+  const uint16_t* p = table + (k * n + j) * n + i;
+  return lerp(bilinear(p, n, tx, ty), bilinear(p + n * n, n, tx, ty), tz);
 }
 constexpr float kUnit = 1.0f / 65535.0f;
 constexpr float kLeast = 1e-4f;  // energies are divided by

@@ -83,15 +83,13 @@ void Microfacet<D>::preserve_energy(float cos_o, Rgb mean) {
   const auto [e, e_mean] = transmits() ? ggx_glass_energy(roughness(), cos_o, fresnel.ior) : ggx_energy(roughness(), cos_o);
   const float missing = (1.0f - e) / e;
   energy_scale = 1.0f + missing;
-  for (int i = 0; i < 3; ++i) {
-    const float bounced = mean[i] * e_mean / (1.0f - mean[i] * (1.0f - e_mean));
-    tint[i] = (1.0f + bounced * missing) / energy_scale;
-  }
+  const Rgb bounced = mean * e_mean / (Rgb(1.0f) - mean * (1.0f - e_mean));
+  tint = (Rgb(1.0f) + bounced * missing) / Rgb(energy_scale);
 }
 
 template <class D>
 LobeEval Microfacet<D>::eval_reflection(Vec3 wo, Vec3 wi, Vec3 h, const FresnelTerms& f) const {
-  const float d = facets.density(h), p = pdf_reflect(f);
+  const float d = facets.density(h), p = transmits() ? pdf_reflect(f) : is_black(f.reflectance) ? 0.0f : 1.0f;
   const float pdf = p * (transmits() ? facets.pdf_reflected(wo, d) : facets.pdf_reflected_bounded(wo, d));
   return {f.reflectance * tint * (energy_scale * d * facets.shadowing(wo, wi)), pdf};
 }

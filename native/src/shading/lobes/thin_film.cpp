@@ -40,7 +40,7 @@ Waves reflect_waves(float cos_i, float near, float n, float k) {
 float f82_reflectance(float cos_i, float near, const FilmSubstrate& m) {
   const float n = m.n / near, k2 = sqr(m.k / near), f0 = (sqr(n - 1.0f) + k2) / (sqr(n + 1.0f) + k2);
   const float f = 6.0f / 7.0f, f5 = f * f * f * f * f, b = (lerp(f0, 1.0f, f5) - m.f82) * (7.0f / (f5 * f));
-  return Fresnel::f82(cos_i, Rgb(f0), Rgb(b)).r;
+  return Fresnel::f82(cos_i, Rgb(f0), Rgb(b)).r();
 }
 
 Complex sensitivity(float difference, int channel) {

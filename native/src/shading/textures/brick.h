@@ -23,7 +23,7 @@ inline Brick brick(Vec3 p, const BrickSettings& s) {
   // Find the brick.
   const int row = int(std::floor(p.y / s.row_height));
   float width = s.width, offset = 0;
-  if (s.offset_frequency && s.squash_frequency) {
+  if (s.offset_frequency > 0 && s.squash_frequency > 0) {
     if (row % s.squash_frequency == 0) width *= s.squash;
     if (row % s.offset_frequency == 0) offset = width * s.offset;
   }

@@ -51,7 +51,7 @@ inline Vec2 gabor_cell(Point<3> cell, Point<3> p, float frequency, float isotrop
   for (int i = 0; i < kImpulses; ++i) {
     const float key = float(3 * i);
     const Rgb r = hash_rgb(Point<4>{{cell[0], cell[1], cell[2], key + 1}});
-    const Point<3> offset = p - Point<3>{{r.r, r.g, r.b}};
+    const Point<3> offset = p - Point<3>{{r.r(), r.g(), r.b()}};
     const float d2 = dot(offset, offset);
     if (d2 >= 1.0f) continue;
     const Point<3> direction = gabor_direction(orientation, isotropy, cell, key);

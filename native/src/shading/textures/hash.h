@@ -67,7 +67,7 @@ inline float hash_value(Point<4> p) { return hash01(p[0], p[1], p[2], p[3]); }
 inline Point<2> hash_point(Point<2> p) { return {{hash01(p[0], p[1]), hash01(p[0], p[1], 1.0f)}}; }
 inline Point<3> hash_point(Point<3> p) {
   const Rgb c = hash_rgb(p);
-  return {{c.r, c.g, c.b}};
+  return {{c.r(), c.g(), c.b()}};
 }
 inline Point<4> hash_point(Point<4> p) {
   return {{hash01(p[0], p[1], p[2], p[3]), hash01(p[3], p[0], p[1], p[2]), hash01(p[2], p[3], p[0], p[1]), hash01(p[1], p[2], p[3], p[0])}};

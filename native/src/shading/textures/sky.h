@@ -5,9 +5,9 @@
 
 namespace gi::texture {
 
-// Of a scattering sky, apart from its table.
+// Of a scattering sky, apart from its table. Floats alone, as all that programs keep in their tables.
 struct SkyDisc {
-  Rgb bottom, top;             // radiance at the disc's edges
+  Vec3 bottom, top;            // radiance at the disc's edges, RGB
   float elevation, rotation;   // of the sun
   Vec3 sun;                    // the direction of its centre
   float cos_reach;             // no direction further from the centre than this meets the disc; above 1: no disc
@@ -31,7 +31,7 @@ inline Rgb sun_disc(Vec3 d, const SkyDisc& s) {
   const float angle = angle_between(d, s.sun), half = 0.5f * s.diameter, elevation = sky_elevation(d);
   if (!(angle < half) || elevation <= s.horizon) return Rgb();
   const float darkening = 1.0f - 0.6f * (1.0f - safe_sqrt(1.0f - sqr(angle / half)));  // of the limb
-  return lerp(s.bottom, s.top, (elevation - s.elevation) / s.diameter + 0.5f) * (s.intensity * darkening);
+  return lerp(Rgb(s.bottom), Rgb(s.top), (elevation - s.elevation) / s.diameter + 0.5f) * (s.intensity * darkening);
 }
 
 // [Preetham et al. 1999, "A practical analytic model for daylight"]
@@ -58,7 +58,7 @@ inline float perez(const PreethamChannel& c, const SkyAngles& a) {
 
 inline Rgb visible_rec709(float x, float y, float z) {
   const Rgb c = xyz_to_rec709(x, y, z);
-  return {std::max(c.r, 0.0f), std::max(c.g, 0.0f), std::max(c.b, 0.0f)};
+  return positive(c);
 }
 
 inline Rgb preetham(Vec3 d, const PreethamSky& s) {

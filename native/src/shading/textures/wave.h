@@ -20,7 +20,7 @@ inline float wave(Vec3 p, const WaveSettings& s) {
   p = (p + Vec3{0.000001f, 0.000001f, 0.000001f}) * 0.999999f;
 
   const int axis = int(s.direction);
-  const bool all = s.direction == WaveDirection::kDiagonalOrSpherical;
+  const bool all = axis < 0 || axis > 2;
   float n;
   if (s.type == Wave::kBands) {
     n = all ? (p.x + p.y + p.z) * 10.0f : p[axis] * 20.0f;
