@@ -108,6 +108,30 @@ void Film::add_row(int tile, int y, int pass, const PixelSample* samples) {
   }
 }
 
+void Film::start_splats(double unit) {
+  const std::lock_guard lock(splats_mutex_);
+  splats_ = std::make_unique<Splats>(moments_.size(), unit);
+}
+
+void Film::end_splats(bool finished) { finished ? splats_->fold() : splats_->drop(); }
+
+void Film::splat(Vec2 at, bool wraps, Rgb value, Vec2 u) {
+  const PixelFilter::Share x = filter_.choose(at.x * float(spec_.width), u.x), y = filter_.choose(at.y * float(spec_.height), u.y);
+  int column = x.pixel, row = y.pixel;
+  if (wraps) {
+    const bool over_pole = row < 0 || row >= spec_.height;
+    if (over_pole) row = row < 0 ? -1 - row : 2 * spec_.height - 1 - row, column += spec_.width / 2;
+    column = (column % spec_.width + spec_.width) % spec_.width;
+  }
+  if (column < spec_.x0 || column >= spec_.x1 || row < spec_.y0 || row >= spec_.y1) return;
+  value *= x.weight * y.weight * spec_.exposure;
+  if (!is_finite(value)) {
+    ++bad_samples_;
+    return;
+  }
+  splats_->add(size_t(row - spec_.y0) * size_t(spec_.region_width()) + size_t(column - spec_.x0), value);
+}
+
 void Film::read(const std::string& pass, float* out) const {
   const size_t w = size_t(spec_.region_width());
   const Layer* layer = nullptr;
@@ -134,23 +158,38 @@ void Film::read(const std::string& pass, float* out) const {
       }
     }
   }
+  if (pass == "Combined") add_splats(out);
+}
+
+void Film::add_splats(float* out) const {
+  const std::lock_guard lock(splats_mutex_);
+  if (!splats_) return;
+  const std::lock_guard sums(splats_->mutex());
+  for (size_t p = 0; p < moments_.size(); ++p) {
+    const Rgb mean = splats_->mean(p);
+    for (size_t k = 0; k < 3; ++k) out[4 * p + k] += mean[int(k)];
+  }
 }
 
 float Film::relative_error() const {
   const size_t pixels = moments_.size();
   double total = 0;
-  for (const Moments& m : moments_) {
+  for (size_t i = 0; i < pixels; ++i) {
+    const Moments& m = moments_[i];
     if (m.count < 2) return kInf;
     total += m.luminance / float(std::max(m.light_count, 1u));
+    if (splats_) total += double(luminance(splats_->mean(i)));
   }
   const float floor = std::max(float(0.1 * total / double(pixels)), 1e-12f);
   std::vector<float> error(pixels);
   for (size_t i = 0; i < pixels; ++i) {
     const Moments& m = moments_[i];
     if (m.light_count < 2) continue;  // no light to judge by: it would keep the render from ending
-    const double n = m.light_count, mean = m.luminance / n;
-    const double variance = std::max(0.0, m.luminance_square / n - mean * mean) * n / (n - 1);
-    error[i] = float(std::sqrt(variance / n) / std::max(std::abs(mean), double(floor)));
+    const double n = m.light_count;
+    double mean = m.luminance / n;
+    double variance = std::max(0.0, m.luminance_square / n - mean * mean) / (n - 1);  // of the mean
+    if (splats_) mean += double(luminance(splats_->mean(i))), variance += splats_->variance_of_mean(i);
+    error[i] = float(std::sqrt(variance) / std::max(std::abs(mean), double(floor)));
   }
   const size_t rank = std::min(pixels - 1, size_t(0.95 * double(pixels)));
   std::nth_element(error.begin(), error.begin() + ptrdiff_t(rank), error.end());
@@ -159,6 +198,7 @@ float Film::relative_error() const {
 
 size_t Film::memory_bytes() const {
   size_t bytes = moments_.size() * sizeof(Moments);
+  if (splats_) bytes += splats_->memory_bytes();
   for (const Layer& layer : layers_) bytes += layer.sum.size() * 4;
   return bytes;
 }

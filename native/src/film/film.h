@@ -9,6 +9,7 @@
 
 #include "core/vec.h"
 #include "film/filter.h"
+#include "film/splats.h"
 
 namespace gi {
 
@@ -58,6 +59,13 @@ class Film {
   // Adds one sample to each pixel of a row of the tile; `y` within the region.
   void add_row(int tile, int y, int pass, const PixelSample* samples);
 
+  // Light that falls on the film at `at`, over the full frame as Camera::sample takes it, from any thread: `value` times the filter is a
+  // pixel's estimate. Belongs to one pixel, drawn by the filter with `u`. `wraps`: film_wraps of the camera.
+  void splat(Vec2 at, bool wraps, Rgb value, Vec2 u);
+  // Before the first splat. `unit`: see Splats.
+  void start_splats(double unit);
+  void end_splats(bool finished);  // of each pass
+
   // Mean of a pass, (region height × region width × channels); "Sample Count" is the number itself.
   static int channels(const std::string& pass);  // 0 if there is no such pass
   void read(const std::string& pass, float* out) const;
@@ -79,6 +87,7 @@ class Film {
     float luminance = 0, luminance_square = 0;
   };
   bool add_moments(Moments& moments, const PixelSample& sample);  // whether its light is a finite number
+  void add_splats(float* out) const;
 
   FilmSpec spec_;
   PixelFilter filter_;
@@ -88,6 +97,8 @@ class Film {
   std::vector<Moments> moments_;
   std::unique_ptr<std::mutex[]> tile_mutex_;
   std::atomic<uint64_t> bad_samples_{0};
+  std::unique_ptr<Splats> splats_;
+  mutable std::mutex splats_mutex_;  // of the pointer
 };
 
 }  // namespace gi

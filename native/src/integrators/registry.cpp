@@ -12,14 +12,13 @@ namespace gi {
 const Descriptor& whitted_descriptor();
 const Descriptor& distributed_descriptor();
 const Descriptor& path_descriptor();
+const Descriptor& light_descriptor();
+const Descriptor& bdpt_descriptor();
 const Descriptor& particle_descriptor();
 
 const std::vector<Descriptor>& integrators() {
   static const std::vector<Descriptor> all{
-      whitted_descriptor(),
-      distributed_descriptor(),
-      path_descriptor(),
-      particle_descriptor(),
+      whitted_descriptor(), distributed_descriptor(), path_descriptor(), light_descriptor(), bdpt_descriptor(), particle_descriptor(),
   };
   return all;
 }

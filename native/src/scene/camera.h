@@ -98,9 +98,7 @@ struct Camera {
     return kind == Kind::kPanoramic ? length(d) : -dot(d, normalize(to_world.column(2)));
   }
 
- private:
-  float pixel_radius(Vec2 pixel) const { return 0.5f * std::max(std::abs(right - left) * pixel.x, std::abs(top - bottom) * pixel.y); }
-
+  // A place on the lens, metres from its middle.
   Vec2 sample_aperture(Vec2 u) const {
     Vec2 lens;
     if (aperture_blades < 3) {
@@ -114,6 +112,9 @@ struct Camera {
     lens.x /= aperture_ratio;
     return lens * aperture_radius;
   }
+
+ private:
+  float pixel_radius(Vec2 pixel) const { return 0.5f * std::max(std::abs(right - left) * pixel.x, std::abs(top - bottom) * pixel.y); }
 };
 
 }  // namespace gi

@@ -28,6 +28,18 @@ std::optional<LobeSample> sample_of(const Lobe& lobe, Vec3 wo, Vec2 u, float u_l
   return std::visit([&](const auto& l) { return l.sample(wo, u, u_lobe); }, lobe);
 }
 
+// Far side over near side; 1 where nothing is bent.
+float refraction_index(const Lobe& lobe) {
+  return std::visit(
+      [](const auto& l) {
+        if constexpr (requires { l.fresnel.ior; })
+          return std::abs(l.fresnel.ior - 1.0f) < 1e-4f ? 1.0f : float(l.fresnel.ior);
+        else
+          return 1.0f;
+      },
+      lobe);
+}
+
 // The sides of a lobe that caustics switches take away: glossy ones only, diffuse light makes no caustics.
 uint8_t sides_without(uint8_t flags, uint8_t without) {
   if (flags & kDiffuse) return 0;
@@ -156,6 +168,28 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, Vec2 u, float u_lobe) const {
   for (int i = count_ - 1; i >= 0; --i)
     if (entries_[i].select > 0.0f) return sample_entry(entries_[i], wo, u, kOneMinusEpsilon);
   return {};
+}
+
+bool Bsdf::is_view_free() const {
+  if (count_ == 1 && select_transparent_ == 0.0f) return true;
+  return std::all_of(begin(), end(), [](const Entry& e) { return std::holds_alternative<Lambert>(e.lobe); });
+}
+
+std::optional<Bsdf::DeltaEval> Bsdf::eval_delta(Vec3 wo, Vec3 wi) const {
+  constexpr float kSame = 1e-3f;  // between unit vectors: what rounding and a normal that heeds the view may do
+  std::optional<DeltaEval> sum;
+  for (const Entry& e : *this) {
+    if (!(e.flags & kSpecular) || !(e.flags & chosen_)) continue;
+    const Vec3 wi_local = e.frame.to_local(wi);
+    for (const float u_lobe : {0.0f, kOneMinusEpsilon}) {  // reflection comes first where there is any
+      const auto s = sample_of(e.lobe, e.frame.to_local(wo), {0.5f, 0.5f}, u_lobe);
+      if (!s || length_squared(s->wi - wi_local) > sqr(kSame)) continue;
+      if (!sum) sum = DeltaEval{Rgb(), e.frame.z};
+      sum->value += e.weight * s->value * (s->flags & kTransmission ? sqr(refraction_index(e.lobe)) : 1.0f);
+      break;
+    }
+  }
+  return sum;
 }
 
 float Bsdf::delta_probability() const {

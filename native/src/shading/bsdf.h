@@ -69,6 +69,15 @@ class Bsdf {
   LobeEval eval(Vec3 wo, Vec3 wi, uint8_t flags) const;
   // A direction on the wrong side of the geometric normal for its lobe ends the path: no sample.
   std::optional<BsdfSample> sample(Vec3 wo, Vec2 u, float u_lobe) const;
+  // Whether no lobe's share of the samples depends on the view: its own setting up aside, the mix is the same for all directions.
+  bool is_view_free() const;
+  // The delta lobes that turn `wi` into `wo`, for paths from the light: what they do to light, and how much narrower a pencil of it
+  // leaves than it came, |dωo cos θo / dωi cos θi| about the lobe's normal (η² where it refracts); nothing if there are none.
+  struct DeltaEval {
+    Rgb value;       // factor and narrowing
+    Vec3 normal;     // of the lobe
+  };
+  std::optional<DeltaEval> eval_delta(Vec3 wo, Vec3 wi) const;
   float delta_probability() const;  // with which `sample` picks a delta lobe, transparency included
   // Picks among the delta lobes alone; pdf_dir is the probability within `sample` (not given that it is a delta lobe).
   std::optional<BsdfSample> sample_delta(Vec3 wo, float u_lobe) const;

@@ -177,9 +177,21 @@ void Program::keep(const Wanted& wanted, const std::vector<float>& values, const
   register_count_ = next;
 }
 
+// The ops that ask for the view, and the closures that set themselves up for it.
+constexpr const char* kViewOps[] = {"incoming", "reflection",   "ray_kind",    "ray_length",  "ray_depth", "light_falloff",
+                                    "fresnel",  "layer_weight", "camera_data", "translucent", "sheen",     "velvet",
+                                    "glossy",   "refraction",   "glass",       "metallic",    "principled"};
+
+bool Program::uses(std::string_view name) const {
+  bool found = false;
+  for_each_instruction(code_, [&](size_t, const Instruction& i) { found = found || name == i.op.name; });
+  return found;
+}
+
 void Program::summarise() {
   effects_ = 0;
   for_each_instruction(code_, [&](size_t, const Instruction& i) { effects_ |= i.op.effects; });
+  sees_view_ = std::any_of(std::begin(kViewOps), std::end(kViewOps), [&](const char* name) { return uses(name); });
   steps_.clear();
   std::vector<uint32_t> step_at(code_.size() + 1, 0);
   for_each_instruction(code_, [&](size_t at, const Instruction& i) {

@@ -95,6 +95,8 @@ class Program {
   const std::string& name() const { return name_; }
   bool has_transparency() const { return effects_ & kAddsTransparency; }
   bool has_emission() const { return effects_ & kAddsEmission; }
+  // Whether its lobes may depend on where the surface is seen from, or on how it came to be seen.
+  bool sees_view() const { return sees_view_; }
   bool empty() const { return code_.empty(); }
   // Immediate `index` of every call of op `name`: what the program will ask of its surroundings.
   std::vector<int32_t> immediates(std::string_view name, int index) const;
@@ -109,6 +111,7 @@ class Program {
   void drop_all_but(uint8_t effects);
   void pack_registers();
   void summarise();
+  bool uses(std::string_view name) const;
   std::optional<Rgb> find_constant_emission() const;
   void run_code(float* registers, ShadeState& state) const;
   std::shared_ptr<Program> reduced_to(uint8_t effects) const;
@@ -126,6 +129,7 @@ class Program {
   };
   std::vector<Step> steps_;
   uint8_t effects_ = 0;
+  bool sees_view_ = false;
   std::optional<Rgb> constant_emission_;
   std::shared_ptr<Program> transparency_, emission_;
 };

@@ -1,0 +1,325 @@
+// Bidirectional path tracing: a subpath from the light and one from the eye, every vertex of the one joined to every vertex of the
+// other, all ways to make the same path weighed against one another [Lafortune & Willems 1993; Veach 1997, ch. 10].
+#include "integrators/integrator.h"
+#include "transport/camera_path.h"
+#include "transport/subpath.h"
+
+namespace gi {
+namespace {
+
+// A path of s vertices from the light and t from the eye, both ends counted.
+struct Strategies {
+  int s, t;  // the one that is shown alone; negative: any
+  bool weighted;
+  float weight(int s_of_path, int t_of_path, float w) const {
+    if ((s >= 0 && s != s_of_path) || (t >= 0 && t != t_of_path)) return 0.0f;
+    return weighted ? w : 1.0f;
+  }
+};
+
+struct EyeVertex {
+  const ShadingPoint& point;
+  const Bsdf& bsdf;
+  PartialWeights weights;
+  const PathState& state;
+};
+
+class BdptIntegrator final : public Integrator {
+ public:
+  explicit BdptIntegrator(const Parameters& p)
+      : s_{{p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
+            p.integer("transparent_bounces")},
+           {p.integer("heuristic") == 0}},
+        strategies_{p.integer("only_s"), p.integer("only_t"), p.on("weighted")},
+        min_bounces_(p.integer("min_bounces")),
+        clamp_direct_(p.real("clamp_direct")),
+        clamp_indirect_(p.real("clamp_indirect")) {}
+
+  void render_pass(const RenderContext& context, int pass, Film& film) override {
+    const FilmSpec& spec = film.spec();
+    if (pass == 0) film.start_splats(splat_unit(context));
+    s_.pixel = {1.0f / float(spec.width), 1.0f / float(spec.height)};
+    for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) {
+      static thread_local LightSubpath light;
+      constexpr uint32_t kLightStream = 0x6c696768u;
+      Sampler light_sampler = sampler.fork(kLightStream);
+      trace_from_light(context, s_, light_sampler, light);
+      splat(context, film, light_sampler, light);
+      trace(context, film, camera, light, sampler, result);
+    });
+    film.end_splats(!context.cancelled);
+  }
+
+ private:
+  // t = 1: the light subpath joined to the lens.
+  void splat(const RenderContext& context, Film& film, Sampler& sampler, const LightSubpath& light) const {
+    const FilmSpec& spec = film.spec();
+    const int pixels = spec.width * spec.height;
+    const float count = float(spec.region_width() * spec.region_height());  // light subpaths of a pass
+    for (int k = 0; k < light.count; ++k) {
+      const LightVertex& v = light.vertices[size_t(k)];
+      sampler.jump_to(uint32_t(k) + 1);
+      sampler.next_2d(), sampler.next_2d();  // those the walk took
+      const Vec2 u_lens = sampler.next_2d(), u_pixel = sampler.next_2d();
+      const auto c = connect_to_lens(context, s_.limits, light, v, pixels, u_lens);
+      if (!c) continue;
+      // All light subpaths of a pass may fall on the pixel, its own eye subpath is one. [Georgiev 2012, eq. 46]
+      const float others = v.weights.sum(s_.heuristic, c->pdf_area / count, c->pdf_reverse);
+      const float weight = strategies_.weight(k + 2, 1, 1.0f / (1.0f + others));
+      if (weight == 0.0f) continue;
+      const Rgb value = c->value * passage_to_lens(context, s_.limits, v, c->lens) * (weight / count);
+      film.splat(c->lens.film, film_wraps(context.camera), clamp_contribution(value, k > 0 ? clamp_indirect_ : clamp_direct_), u_pixel);
+    }
+  }
+
+  void trace(const RenderContext& context, const Film& film, const CameraRay& camera, const LightSubpath& light, Sampler& sampler,
+             PixelSample& result) const {
+    const Heuristic h = s_.heuristic;
+    const float pixels = float(film.spec().width * film.spec().height);
+    const float light_count = float(film.spec().region_width() * film.spec().region_height());
+    Bsdf bsdf;
+    CameraPath path(camera);
+    PartialWeights weights;  // of the ray that leaves the vertex before
+    bool may_scatter = true, meets = true;
+    float travelled = 0;  // since the vertex before
+
+    const auto add = [&](Rgb radiance, int depth) {
+      if (!is_black(radiance))
+        result.radiance += clamp_contribution(path.throughput * radiance, depth > 1 ? clamp_indirect_ : clamp_direct_);
+    };
+    // s = 0: the ray meets a luminaire by itself, which light sampling (s = 1) or a light subpath might have begun at. [Georgiev 2012, eq.
+    // 43]
+    const auto found = [&](Rgb radiance, float pdf_direct, uint32_t emitter) {
+      if (is_black(radiance)) return Rgb();
+      float others = 0;
+      if (path.state.depth > 0)
+        others = h(pdf_direct) * weights.vcm +
+                 h(meets ? pdf_emit(context, emitter, path.origin.query.position, path.ray.direction) : 0.0f) * weights.vc;
+      return radiance * strategies_.weight(0, path.state.depth + 2, 1.0f / (1.0f + others));
+    };
+
+    for (uint32_t bounce = 0;; ++bounce) {
+      sampler.jump_to(bounce + 1);
+      const uint32_t visibility = visibility_of(path.state.kind);
+      const auto hit = context.scene.intersect(path.ray, visibility);
+      add(lamps_along(context, path, hit ? hit->t : kInf, visibility, found), path.state.depth);
+      if (!hit) {
+        add(leave(context, film, path, found, result), path.state.depth);
+        break;
+      }
+
+      // Arrive: the footprint is that of a surface seen directly, for both kinds of subpath must see the same textures.
+      const float segment = travelled + hit->t;
+      path.travelled = length(path.ray.origin + path.ray.direction * hit->t - camera.ray.origin) - hit->t;
+      const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
+      const uint32_t emitter = context.lights.light_of_triangle(point.instance, point.triangle);
+      const float pdf_direct = is_black(bsdf.emission) ? 0.0f : context.lights.pdf_triangle(path.origin.query, point);
+      const Rgb emitted = found(bsdf.emission, pdf_direct, emitter);
+      if (path.state.depth == 0) result.emission += path.throughput * bsdf.emission;
+      add(emitted, path.state.depth);
+      const float cos_in = abs_dot(point.ng, point.wo);
+      if (!(cos_in > 0.0f)) break;
+      EyeVertex here{point, bsdf, weights.arrived(h, segment, cos_in), path.state};
+      if (path.state.depth == 0)
+        here.weights = {h(light_count / (lens_density(context.camera, camera.ray, segment) * pixels * cos_in)), 0.0f};  // [eq. 45]
+
+      const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
+      const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
+      if (may_scatter && !bsdf.is_delta()) {
+        add(direct_light(context, here, u_light_choice, u_light), path.state.depth + 1);
+        for (int k = 0; k < light.count; ++k) add(connect(context, here, light, k), path.state.depth + 2);
+      }
+
+      // Draw the next direction.
+      const auto next = bsdf.sample(point.wo, u, u_lobe);
+      if (!next || !(next->pdf_dir > 0.0f)) break;
+      const bool transparent = next->flags & kTransparent;
+      if (!may_scatter && !transparent) break;
+      const Rgb weight = next->value / next->pdf_dir;
+      path.throughput *= weight;
+      if (is_black(path.throughput)) break;
+      if (transparent) {
+        if (!advance(path.state, next->flags, s_.limits)) break;
+        const float left = path.ray.t_max - hit->t;
+        travelled = segment;
+        path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, left};
+        path.origin.query.path = path.state;
+        continue;
+      }
+
+      // Follow it.
+      const bool is_delta = next->flags & kSpecular;
+      const float pdf_reverse = is_delta || here.weights.vc == 0.0f ? 0.0f : reverse(context, here, next->wi).pdf_dir;
+      weights = here.weights.scattered(h, is_delta, abs_dot(point.ng, next->wi), next->pdf_dir, pdf_reverse);
+      meets = meets_light(context.scene, point);
+      travelled = 0;
+      may_scatter = advance(path.state, next->flags, s_.limits);
+      const FilmSpec& spec = film.spec();
+      const bool through_glass = spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness;
+      if (!through_glass) path.seen_from_camera = false;
+      path.origin = {light_query(point, bsdf), is_delta ? kInf : next->pdf_dir};
+      path.origin.query.path = path.state;
+      path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+
+      // Russian roulette.
+      const float alpha = path.state.depth <= min_bounces_ ? 1.0f : std::min(1.0f, std::sqrt(max_component(path.throughput)));
+      if (alpha < 1.0f) {
+        if (sampler.next_1d() >= alpha) break;
+        path.throughput *= 1.0f / alpha;
+      }
+    }
+  }
+
+  // s = 1: a light chosen for this vertex.
+  Rgb direct_light(const RenderContext& context, const EyeVertex& z, float u_choice, Vec2 u) const {
+    const Heuristic h = s_.heuristic;
+    const auto light = context.lights.sample(light_query(z.point, z.bsdf), u_choice, u);
+    if (!light || is_black(light->radiance) || !(light->pdf_dir > 0.0f)) return Rgb();
+    const LobeEval e = eval_for_light(z.bsdf, z.point.wo, *light);
+    if (is_black(e.value)) return Rgb();
+    // Against the ray that meets the luminaire by itself, and light subpaths. [Georgiev 2012, eq. 44]
+    float others = !light->is_delta && light->use_mis ? h(e.pdf_dir / light->pdf_dir) : 0.0f;
+    const float pdf_emitted = meets_light(context.scene, z.point) ? pdf_emit(context, light->light, z.point.position, light->wi) : 0.0f;
+    if (pdf_emitted > 0.0f) {
+      const float pdf_area = pdf_emitted * abs_dot(z.point.ng, light->wi) / light->pdf_dir;
+      others += z.weights.sum(h, pdf_area, z.weights.vc > 0.0f ? reverse(context, z, light->wi).pdf_dir : 0.0f);
+    }
+    const float weight = strategies_.weight(1, z.state.depth + 2, 1.0f / (1.0f + others));
+    return shadowed(context, z.point, *light, e.value * light->radiance * (weight / light->pdf_dir));
+  }
+
+  // s > 1, t > 1: both vertices joined. [Veach 1997, eq. 10.8]
+  Rgb connect(const RenderContext& context, const EyeVertex& z, const LightSubpath& light, int k) const {
+    const Heuristic h = s_.heuristic;
+    const LightVertex& y = light.vertices[size_t(k)];
+    if (y.bsdf.is_delta() || strategies_.weight(k + 2, z.state.depth + 2, 1.0f) == 0.0f) return Rgb();
+    const Vec3 to = y.point.position - z.point.position;
+    const float distance = length(to);
+    if (!(distance > 0.0f)) return Rgb();
+    const Vec3 w = to / distance;
+
+    // Bounces as Blender counts them.
+    const uint8_t at_z = bounce_flags(z.bsdf, z.point, w);
+    BounceCount bounces = y.bounces;
+    bounces.total += z.state.depth, bounces.diffuse += z.state.diffuse_depth, bounces.glossy += z.state.glossy_depth,
+        bounces.transmission += z.state.transmission_depth;
+    bounces.add(at_z);
+    if (!y.is_first) bounces.add(bounce_flags(y.bsdf, y.point, -w));
+    if (!bounces.within(s_.limits) || bounces.total > light.max_bounces) return Rgb();
+
+    // What passes: f at both ends and the geometry between, in the measure of the true normals.
+    const LobeEval from_z = eval_seen_by(z.bsdf, z.point.wo, w, context.scene.instances()[y.point.instance].data->visibility);
+    if (is_black(from_z.value)) return Rgb();
+    const LobeEval at_y = eval_turned(context, y.point, y.bsdf, -w, unknown_state(), y.seen_by);
+    if (is_black(at_y.value)) return Rgb();
+    const float cos_y = abs_dot(y.point.ng, w), cos_z = abs_dot(z.point.ng, w), inv_d2 = 1.0f / sqr(distance);
+    const Rgb value = y.power * at_y.value * from_z.value * (cos_y * inv_d2 / abs_dot(y.point.ng, y.point.wo));
+
+    // The weight. [Georgiev 2012, eq. 37, 38, 40, 41]
+    const float pdf_y = y.bsdf.eval(y.point.wo, -w).pdf_dir;
+    const float others = y.weights.sum(h, from_z.pdf_dir * cos_y * inv_d2, at_y.pdf_dir) +
+                         z.weights.sum(h, pdf_y * cos_z * inv_d2, z.weights.vc > 0.0f ? reverse(context, z, w).pdf_dir : 0.0f);
+    const Rgb contribution = value * strategies_.weight(k + 2, z.state.depth + 2, 1.0f / (1.0f + others));
+    if (is_black(contribution)) return Rgb();
+
+    const Vec3 start = offset_point(z.point.position, z.point.ng, w), end = offset_point(y.point.position, y.point.ng, -w);
+    const float free = length(end - start);
+    PathState state = z.state;
+    const bool within = advance(state, at_z, s_.limits);
+    (void)within;
+    return contribution * passage(context, {start, (end - start) / free, 0.0f, free * (1.0f - 1e-4f)}, visibility_of(state.kind), state,
+                                  s_.limits.transparent);
+  }
+
+  // The density with which light that comes to z from w would go on to where z was seen from.
+  static LobeEval reverse(const RenderContext& context, const EyeVertex& z, Vec3 w) {
+    return eval_turned(context, z.point, z.bsdf, w, unknown_state());
+  }
+
+  // Of light subpaths; those of lamps that throw no shadow are not followed.
+  static float pdf_emit(const RenderContext& context, uint32_t emitter, Vec3 position, Vec3 wi) {
+    if (emitter == kNoId) return 0.0f;
+    const LampData* lamp = context.lights.lamp(emitter);
+    return lamp && !lamp->cast_shadow ? 0.0f : context.lights.pdf_emit(emitter, position, wi);
+  }
+
+  template <class Found>
+  static Rgb lamps_along(const RenderContext& context, const CameraPath& path, float t_surface, uint32_t visibility, const Found& found) {
+    Rgb sum;
+    if (!context.lights.has_findable_lamps()) return sum;
+    Ray ray = path.ray;
+    ray.t_max = t_surface;
+    for (auto hit = context.lights.intersect_lamp(ray, visibility); hit; hit = context.lights.intersect_lamp(ray, visibility, &*hit)) {
+      const LightEval e = context.lights.eval_lamp(path.origin.query, ray, *hit);
+      sum += found(e.radiance, e.pdf_dir, hit->lamp);
+    }
+    return sum;
+  }
+
+  // Suns and the world.
+  template <class Found>
+  static Rgb leave(const RenderContext& context, const Film& film, const CameraPath& path, const Found& found, PixelSample& sample) {
+    if (path.seen_from_camera && film.spec().transparent) {
+      sample.alpha -= average(path.throughput);
+      return Rgb();
+    }
+    const uint32_t visibility = visibility_of(path.state.kind);
+    Rgb sum;
+    for (uint32_t sun = 0; sun < context.lights.sun_count(); ++sun) {
+      const LightEval e = context.lights.eval_sun(sun, path.origin.query, path.ray.direction, visibility);
+      sum += found(e.radiance, e.pdf_dir, context.lights.light_of_sun(sun));
+    }
+    if (context.scene.data().world.visibility & visibility) {
+      const Rgb radiance = context.scene.world_radiance(path.ray.direction, path.state);
+      if (!is_black(radiance))
+        sum += found(radiance, context.lights.pdf_world(path.origin.query, path.ray.direction), context.lights.world_light());
+    }
+    if (path.seen_from_camera) sample.environment += path.throughput * sum;
+    return sum;
+  }
+
+  SubpathSettings s_;
+  Strategies strategies_;
+  int min_bounces_;
+  float clamp_direct_, clamp_indirect_;
+};
+
+}  // namespace
+
+const Descriptor& bdpt_descriptor() {
+  using Kind = Parameter::Kind;
+  static const Descriptor descriptor{
+      "bdpt",
+      "Bidirectional Path Tracing",
+      "Paths from the eye and from the lights, joined in every way: for light that comes around corners and through glass; unbiased. "
+      "Light Path nodes see diffuse rays where light arrives from a lamp's side",
+      {
+          {"heuristic",
+           "Heuristic",
+           Kind::kChoice,
+           0,
+           0,
+           1,
+           "How the ways to make a path are weighed against one another",
+           "",
+           {{"POWER", "Power", "By the squares of their densities"}, {"BALANCE", "Balance", "By their densities"}}},
+          {"min_bounces", "Minimum Bounces", Kind::kInt, 0, 0, 1024, "Bounces before roulette begins"},
+          {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
+          {"diffuse_bounces", "Diffuse", Kind::kInt, 4, 0, 1024, "Diffuse reflections"},
+          {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},
+          {"transmission_bounces", "Transmission", Kind::kInt, 12, 0, 1024, "Refractions"},
+          {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
+          {"clamp_direct", "Clamp Direct", Kind::kFloat, 0, 0, 1e9,
+           "Largest radiance that one sample may add directly; 0 is off. Loses light"},
+          {"clamp_indirect", "Clamp Indirect", Kind::kFloat, 0, 0, 1e9,
+           "Largest radiance that one sample may add after a bounce; 0 is off. Loses light"},
+          {"only_s", "Only s", Kind::kInt, -1, -1, 1024, "Shows only paths with this many vertices from the light; -1: all"},
+          {"only_t", "Only t", Kind::kInt, -1, -1, 1024,
+           "Shows only paths with this many vertices from the eye, the lens among them; -1: all"},
+          {"weighted", "Weighted", Kind::kBool, 1, 0, 1, "Off: every way counts in full, to look at one of them alone"},
+      },
+      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<BdptIntegrator>(p); }};
+  return descriptor;
+}
+
+}  // namespace gi

@@ -1,0 +1,195 @@
+// Walking from the light, and what a vertex sends on.
+#include "transport/subpath.h"
+
+namespace gi {
+namespace {
+
+constexpr uint32_t kIndirect = kRayDiffuse | kRayGlossy | kRayTransmission;
+
+// Light of a delta lobe, as the eye will see it: f and the narrowing of the pencil, and both cosines about the true normal.
+Rgb delta_factor(const RenderContext& context, const ShadingPoint& point, const BsdfSample& next, uint32_t seen_by) {
+  static thread_local Bsdf bsdf;
+  const uint32_t kind = next.flags & kTransmission ? kRayTransmission : kRayGlossy;
+  if (!(seen_by & kind)) return Rgb();
+  ShadingPoint turned =
+      context.scene.surface_point(point.instance, point.triangle, point.b1, point.b2, next.wi, point.path, point.footprint);
+  context.scene.shade(turned, bsdf);
+  const auto e = bsdf.eval_delta(next.wi, point.wo);
+  if (!e) return Rgb();
+  const float out = abs_dot(point.ng, next.wi) * abs_dot(e->normal, point.wo),
+              in = abs_dot(point.ng, point.wo) * abs_dot(e->normal, next.wi);
+  return in > 0.0f ? e->value * (out / in) : Rgb();
+}
+
+}  // namespace
+
+PathState unknown_state() {
+  PathState state;
+  state.kind = kRayDiffuse | kRayReflection, state.depth = 1;
+  return state;
+}
+
+LobeEval eval_seen_by(const Bsdf& bsdf, Vec3 wo, Vec3 wi, uint32_t seen_by) {
+  if ((seen_by & kIndirect) == kIndirect) return bsdf.eval(wo, wi);
+  LightSample light;
+  light.wi = wi, light.visibility = seen_by;
+  return eval_for_light(bsdf, wo, light);
+}
+
+float footprint_at(const Camera& camera, const Vec2& pixel, Vec3 position) {
+  const CameraRay middle = camera.sample({0.5f, 0.5f}, pixel, {0.5f, 0.5f});
+  const float at_lens = middle.footprint - middle.spread * camera.clip_start;
+  return at_lens + middle.spread * length(position - camera.to_world.translation());
+}
+
+LobeEval eval_turned(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, Vec3 w, const PathState& path,
+                     uint32_t seen_by) {
+  const Program& program = context.scene.material(context.scene.material_of(point.instance, point.triangle)).program;
+  if (!program.sees_view() && dot(point.ng, w) > 0.0f && bsdf.is_view_free()) return eval_seen_by(bsdf, w, point.wo, seen_by);
+  static thread_local Bsdf other;
+  ShadingPoint turned = context.scene.surface_point(point.instance, point.triangle, point.b1, point.b2, w, path, point.footprint);
+  turned.path.ray_length = point.path.ray_length;
+  context.scene.shade(turned, other);
+  return eval_seen_by(other, w, point.wo, seen_by);
+}
+
+uint8_t bounce_flags(const Bsdf& bsdf, const ShadingPoint& point, Vec3 wi) {
+  if (dot(point.ng, wi) < 0.0f) return kTransmission | (bsdf.flags() & kDiffuse ? kDiffuse : kGlossy);
+  if (!(bsdf.flags() & kDiffuse)) return kReflection | kGlossy;
+  if (!(bsdf.flags() & kGlossy)) return kReflection | kDiffuse;
+  const float diffuse = average(bsdf.eval(point.wo, wi, kReflection | kDiffuse).value);
+  return kReflection | (diffuse >= 0.5f * average(bsdf.eval(point.wo, wi).value) ? kDiffuse : kGlossy);
+}
+
+Rgb passage(const RenderContext& context, Ray ray, uint32_t visibility, PathState path, int transparent_limit) {
+  Rgb passed(1.0f);
+  for (int layers = 0; layers <= transparent_limit; ++layers) {
+    const auto hit = context.scene.intersect(ray, visibility);
+    if (!hit) return passed;
+    ShadingPoint point = context.scene.shading_point(ray, *hit, path);
+    passed *= context.scene.transparency(point);
+    if (is_black(passed)) return Rgb();
+    ++path.transparent_depth;
+    ray = {offset_point(point.position, point.ng, ray.direction), ray.direction, 0.0f, ray.t_max - hit->t};
+  }
+  return Rgb();
+}
+
+void trace_from_light(const RenderContext& context, const SubpathSettings& settings, Sampler& sampler, LightSubpath& path) {
+  const Heuristic h = settings.heuristic;
+  path.count = 0;
+  const float u_choice = sampler.next_1d();
+  const Vec2 u_place = sampler.next_2d(), u_direction = sampler.next_2d();
+  const auto emitted = context.lights.emit(u_choice, u_place, u_direction);
+  if (!emitted || !emitted->cast_shadow) return;
+  const LampData* lamp = context.lights.lamp(emitted->light);
+  path.max_bounces = lamp ? lamp->max_bounces : context.lights.is_world(emitted->light) ? context.scene.data().world.max_bounces : 1024;
+  Ray ray = emitted->ray;
+  PathState state = unknown_state();
+  LightVertex carried;  // what the next vertex begins with; its point and lobes are not used
+  Rgb passed(1.0f);     // by see-through surfaces on the way
+  float travelled = 0;
+
+  for (uint32_t bounce = 0;; ++bounce) {
+    sampler.jump_to(bounce + 1);
+    const auto hit = context.scene.intersect(ray, kIndirect);
+    if (!hit) return;
+    const uint32_t visible = context.scene.instances()[hit->instance].data->visibility;
+    if (path.vertices.size() <= size_t(path.count)) path.vertices.emplace_back();
+    LightVertex& v = path.vertices[size_t(path.count)];
+    v.point = context.scene.shading_point(ray, *hit, state);
+    if (carried.is_first && !(visible & kRayShadow)) {  // throws no shadow: the light goes on as if nothing were there
+      ray = {offset_point(v.point.position, v.point.ng, ray.direction), ray.direction};
+      continue;
+    }
+    v.point.footprint = footprint_at(context.camera, settings.pixel, v.point.position);
+    context.scene.shade(v.point, v.bsdf);
+    const float cos_in = abs_dot(v.point.ng, v.point.wo);
+    v.bounces = carried.bounces, v.seen_by = carried.seen_by, v.is_first = carried.is_first;
+    if (!(cos_in > 0.0f)) return;
+    if (v.is_first) {
+      const auto light = context.lights.arriving(*emitted, light_query(v.point, v.bsdf));
+      const float pdf_emit = context.lights.pdf_emit(emitted->light, v.point.position, v.point.wo);
+      if (!light || !(pdf_emit > 0.0f)) return;
+      // Densities of one path's two ends as sampled directly and by itself. [Georgiev 2012, eq. 31, 32 and 48 to 52, here per steradian and
+      // area at this vertex, which serves lights near and far alike]
+      v.weights.vcm = h(light->pdf_dir / (pdf_emit * cos_in));
+      v.weights.vc = light->is_delta || !light->use_mis ? 0.0f : h(1.0f / (pdf_emit * cos_in));
+      v.power = light->radiance * passed / pdf_emit;
+      v.seen_by = light->visibility;
+    } else {
+      v.weights = carried.weights.arrived(h, travelled + hit->t, cos_in);
+      v.power = carried.power * passed;
+    }
+    ++path.count;
+
+    // Draw the next direction.
+    const float u_lobe = sampler.next_1d(), u_continue = sampler.next_1d();
+    const auto next = v.bsdf.sample(v.point.wo, sampler.next_2d(), u_lobe);
+    if (!next || !(next->pdf_dir > 0.0f)) return;
+    if (next->flags & kTransparent) {
+      passed *= next->value / next->pdf_dir;
+      if (!advance(state, next->flags, settings.limits) || is_black(passed)) return;
+      travelled += hit->t;
+      ray = {offset_point(v.point.position, v.point.ng, ray.direction), ray.direction};
+      continue;
+    }
+    carried.bounces = v.bounces;
+    if (!v.is_first) carried.bounces.add(next->flags);
+    if (!carried.bounces.within(settings.limits)) return;
+
+    // What the surface makes of the light as seen from where it goes, in the measure of the true normal. [Veach 1997, §5.3]
+    const float cos_out = abs_dot(v.point.ng, next->wi);
+    const bool is_delta = next->flags & kSpecular;
+    Rgb factor;
+    float pdf_reverse = 0;
+    if (is_delta) {
+      factor = delta_factor(context, v.point, *next, v.seen_by) / next->pdf_dir;
+    } else {
+      const LobeEval e = eval_turned(context, v.point, v.bsdf, next->wi, state, v.seen_by);
+      factor = e.value * (cos_out / (cos_in * next->pdf_dir)), pdf_reverse = e.pdf_dir;
+    }
+    if (is_black(factor)) return;
+
+    // Russian roulette by what is left.
+    const float alpha = std::min(1.0f, max_component(factor));
+    if (u_continue >= alpha) return;
+    carried.power = v.power * factor / alpha;
+    carried.weights = v.weights.scattered(h, is_delta, cos_out, next->pdf_dir, pdf_reverse);
+    carried.is_first = false, carried.seen_by = visible;
+    passed = Rgb(1.0f), travelled = 0;
+    ray = {offset_point(v.point.position, v.point.ng, next->wi), next->wi};
+  }
+}
+
+std::optional<LensConnection> connect_to_lens(const RenderContext& context, const BounceLimits& limits, const LightSubpath& path,
+                                              const LightVertex& v, int pixels, Vec2 u_lens) {
+  const InstanceData& instance = *context.scene.instances()[v.point.instance].data;
+  if (v.bsdf.is_delta() || instance.holdout || !(instance.visibility & kRayCamera)) return {};
+  const auto lens = sample_lens(context.camera, v.point.position, u_lens);
+  if (!lens) return {};
+  const LobeEval e = eval_turned(context, v.point, v.bsdf, lens->wi, PathState(), v.seen_by);
+  if (is_black(e.value)) return {};
+  BounceCount bounces = v.bounces;
+  if (!v.is_first) bounces.add(bounce_flags(v.bsdf, v.point, lens->wi));
+  if (!bounces.within(limits) || bounces.total > path.max_bounces) return {};
+  const float cos_in = abs_dot(v.point.ng, v.point.wo), cos_out = abs_dot(v.point.ng, lens->wi);
+  LensConnection c{*lens, v.power * e.value * (cos_out / cos_in * lens->density * float(pixels)), 0.0f, e.pdf_dir};
+  const Ray seen{v.point.position + lens->wi * lens->free, -lens->wi};
+  c.pdf_area = lens_density(context.camera, seen, lens->free) * float(pixels) * cos_out;
+  return c;
+}
+
+Rgb passage_to_lens(const RenderContext& context, const BounceLimits& limits, const LightVertex& v, const LensSample& lens) {
+  const Vec3 end = offset_point(v.point.position, v.point.ng, lens.wi);
+  return passage(context, {end + lens.wi * lens.free, -lens.wi, 0.0f, lens.free * (1.0f - 1e-4f)}, kRayCamera, PathState(),
+                 limits.transparent);
+}
+
+double splat_unit(const RenderContext& context) {
+  const double radius = 0.5 * double(length(context.scene.bounds().extent()));
+  const double unit = double(context.lights.emitted_power()) / (radius * radius) * 0x1p-44;
+  return unit > 0 && std::isfinite(unit) ? unit : 1e-12;
+}
+
+}  // namespace gi
