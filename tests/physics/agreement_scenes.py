@@ -5,7 +5,7 @@ import math
 import numpy as np
 from light_scenes import lamp, matrix, with_world
 from test_closed_forms import looking, quad, scene_of, shiny, sphere, surface
-from test_closures import MULTISCATTER, PLAIN
+from test_closures import stack_layers
 
 from gi_engine import scene_data as sd
 from gi_engine.nodes.program import ProgramBuilder
@@ -30,14 +30,7 @@ def gloss_of_all_bounces(b):
 
 
 def principled(**changes):
-    def fill(b):
-        b.op(
-            "principled",
-            *{**PLAIN, "base_color": (0.7, 0.3, 0.2), "roughness": 0.4, **changes}.values(),
-            imm=(MULTISCATTER,),
-        )
-
-    return fill
+    return lambda b: stack_layers(b, **{"base_color": (0.7, 0.3, 0.2), "roughness": 0.4, **changes})
 
 
 def bumpy_normal(b):

@@ -173,11 +173,16 @@ def shaded_by(b, cos_o, backfacing):
 
 
 def principled(cos_o=1.0, backfacing=False, **changes):
+    b = ProgramBuilder()
+    stack_layers(b, **changes)
+    return shaded_by(b, cos_o, backfacing)
+
+
+def stack_layers(b, **changes):
     """All layers of the Principled BSDF, as its rule stacks them."""
     unknown = set(changes) - set(PLAIN)
     assert not unknown
     p = {**PLAIN, **changes}
-    b = ProgramBuilder()
     unlinked, film, imm = (0, 0, 0), (p["film"], p["film_ior"]), (MULTISCATTER,)
     brushed = p["anisotropic"], p["rotation"], p["tangent"]
     below = b.op("sheen_layer", 1.0, unlinked, unlinked, p["coat"], p["sheen"], p["sheen_roughness"], p["sheen_tint"])
@@ -190,7 +195,6 @@ def principled(cos_o=1.0, backfacing=False, **changes):
     below = b.op("specular_layer", below, unlinked, *specular, *brushed, *film, imm=imm)
     base = p["base_color"], p["diffuse_roughness"], p["subsurface"], p["subsurface_anisotropy"], p["thin_wall"]
     b.op("base_layer", below, unlinked, *base)
-    return shaded_by(b, cos_o, backfacing)
 
 
 @pytest.mark.parametrize("cos_o", [1.0, 0.6, 0.15])
