@@ -51,7 +51,7 @@ class TexelLattice {
     const Triangle& t = triangles_[triangle];
     return t.level == 0 && (t.corner[0] & t.corner[1] & t.corner[2] & kMerged);
   }
-  uint32_t cells_of(uint32_t triangle) const { return 1u << 2 * triangles_[triangle].level; }
+  int level(uint32_t triangle) const { return triangles_[triangle].level; }  // log2 of the small triangles along an edge
   // The k-th small triangle of a triangle, with the weights of its middle.
   LatticeCell cell(uint32_t triangle, uint32_t k) const;
   // The node, or nodes, that a corner of the cell belongs to, times `weight`. `choice`: a number in [0, 1) that picks one of the

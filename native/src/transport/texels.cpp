@@ -16,8 +16,8 @@ namespace gi {
 namespace {
 
 constexpr double kCoarser = 1.189207115;  // fourth root of 2: steps in which texels grow
-constexpr double kMostCells = 6e6;        // that are looked at for what stands on them
-constexpr double kMostSightRays = 2e7;    // spent on the areas of those that something does stand on
+constexpr double kMostCells = 1e7;        // that are looked at for what stands on them
+constexpr double kMostSightRays = 1e7;    // spent on the areas of those that something does stand on
 constexpr double kHidden = 0.02;          // share of a hat below which it counts as hidden
 constexpr uint32_t kSightMask = kRayDiffuse;
 
@@ -184,13 +184,23 @@ void Texels::find_splits(ThreadPool& pool, const std::atomic<bool>& cancelled) {
 void Texels::test_triangle(uint32_t instance, uint32_t triangle, bool back, std::vector<uint32_t>& found) const {
   const TexelLattice& lattice = *places_[instance].lattice;
   if (lattice.is_merged(triangle)) return;
-  const auto is_split = [&](const SightCell& s) {
-    for (size_t k = 0; k < 3; ++k)
-      if (!s.sees(scene_, s.inside(k), s.inside((k + 1) % 3)) || !s.sees(scene_, s.inside(k), s.middle)) return true;
-    return false;
-  };
-  for (uint32_t k = 0; k < lattice.cells_of(triangle); ++k)
-    if (is_split(SightCell(scene_, instance, lattice.cell(triangle, k), back))) found.push_back(triangle), found.push_back(k);
+  // Every edge between lattice points belongs to one upright small triangle: (i, j) of row j. Those of a row alternate with the
+  // others, upside down, across its edges.
+  const uint32_t n = 1u << lattice.level(triangle);
+  const auto index = [&](uint32_t i, uint32_t j, bool upright) { return j * (2 * n - j) + 2 * i + (upright ? 0 : 1); };
+  std::vector<bool> split(size_t(n) * n, false);
+  for (uint32_t j = 0; j < n; ++j)
+    for (uint32_t i = 0; i + j < n; ++i) {
+      const SightCell s(scene_, instance, lattice.cell(triangle, index(i, j, true)), back);
+      const auto cut = [&](size_t from, size_t to) { return !s.sees(scene_, s.inside(from), s.inside(to)); };
+      const bool below = cut(0, 1), beyond = cut(1, 2), left = cut(2, 0);
+      if (below || beyond || left) split[index(i, j, true)] = true;
+      if (below && j > 0) split[index(i, j - 1, false)] = true;
+      if (left && i > 0) split[index(i - 1, j, false)] = true;
+      if (beyond && i + j + 1 < n) split[index(i, j, false)] = true;
+    }
+  for (uint32_t k = 0; k < n * n; ++k)
+    if (split[k]) found.push_back(triangle), found.push_back(k);
 }
 
 void Texels::measure_split(uint32_t instance, bool back, uint32_t triangle, uint32_t k, int samples,
