@@ -103,6 +103,13 @@ class PathIntegrator final : public Integrator {
         break;
       }
 
+      if (!may_scatter) {
+        if (const auto emitted = path.end(context, camera, *hit, mode)) {
+          add(*emitted, path.state.depth);
+          break;
+        }
+      }
+
       const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
       // The less likely the path, the less sharp what it sees: as Blender's Filter Glossy does it.
       if (least_pdf < s_.filter_glossy) bsdf.blur(0.5f * std::sqrt(1.0f - least_pdf / s_.filter_glossy));

@@ -85,6 +85,8 @@ struct CameraPath {
 
   explicit CameraPath(const CameraRay& camera) : ray(camera.ray) { origin.query.path = state; }
 
+  float footprint(const CameraRay& camera, const Hit& hit) const { return camera.footprint + camera.spread * (travelled + hit.t); }
+
   // The ray leaves the scene: suns and the world, or a hole in the picture where the film is transparent. Returns radiance.
   Rgb leave(const RenderContext& context, const Film& film, LightSampling mode, PixelSample& sample) const {
     if (seen_from_camera && film.spec().transparent) {
@@ -96,10 +98,21 @@ struct CameraPath {
     return beyond;
   }
 
+  // Past its last bounce the path only looks for luminaires. What it finds on the surface that it met; nothing if that lets
+  // light through, or may cut a hole into the picture: then `arrive` has to be asked.
+  std::optional<Rgb> end(const RenderContext& context, const CameraRay& camera, const Hit& hit, LightSampling mode) const {
+    const Scene& scene = context.scene;
+    const Program& program = scene.material(scene.material_of(hit.instance, hit.triangle)).program;
+    if (seen_from_camera || program.has_transparency()) return {};
+    if (!program.has_emission()) return Rgb();
+    ShadingPoint point = scene.shading_point(ray, hit, state, footprint(camera, hit));
+    return surface_emission(context, point, scene.emission(point), origin, mode);
+  }
+
   // The ray arrives at a surface: shades it, for the data passes too, and cuts out what is held out.
   ShadingPoint arrive(const RenderContext& context, const Film& film, const CameraRay& camera, const Hit& hit, Bsdf& bsdf,
                       PixelSample& sample) const {
-    ShadingPoint point = context.scene.shading_point(ray, hit, state, camera.footprint + camera.spread * (travelled + hit.t));
+    ShadingPoint point = context.scene.shading_point(ray, hit, state, footprint(camera, hit));
     context.scene.shade(point, bsdf);
     if (context.lightmap && state.depth == 0) context.lightmap->adapt(bsdf, point.wo, point.ng, point.ns);
     if (state.depth == 0 && film.has_data_passes()) record_surface(context, point, bsdf, sample);
