@@ -190,6 +190,18 @@ def test_textured_emission_has_the_power_of_its_texture():
     assert power.mean() == pytest.approx(2 * np.pi * 1.5, abs=4.5 * power.std() / np.sqrt(SAMPLES))
 
 
+def test_many_emitters_send_light_evenly():
+    """A field of 100,000 triangles of one size: as many rays from each thousand."""
+    k = np.arange(100_000)
+    place = np.stack([k % 400, k // 400, 0 * k], 1)
+    lights = build(triangle_scene(place[:, None] + np.array([(0, 0, 0), (0.5, 0, 0), (0, 0.5, 0)])))
+    table = lights.emit(*np.random.default_rng(8).random((2, SAMPLES, 3), np.float32))
+    sent = table[:, 9] >= 0
+    assert sent.mean() > 0.999
+    counts = np.bincount((table[sent, 9] // 1000).astype(int), minlength=100)
+    assert stats.chisquare(counts).pvalue > SIGNIFICANCE
+
+
 def test_lamps_of_soft_falloff_turn_to_whoever_looks():
     """Close to such a lamp, what has left it at its rim is not what is seen there."""
     lights = build(LOCAL["soft point"]())

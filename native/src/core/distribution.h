@@ -7,9 +7,9 @@
 
 namespace gi {
 
-// The cumulative sums of `n` < 65536 values, which the caller keeps: cdf[0] = 0 … cdf[n] = 1. `guide`: for each of n even steps of u, where
+// The cumulative sums of `n` values (fewer than 2³²), which the caller keeps: cdf[0] = 0 … cdf[n] = 1. `guide`: for each of n even steps of u, where
 // the search begins. [Chen & Asau 1974, "On generating random variates from an empirical distribution"]
-inline double make_cdf(const float* values, size_t n, float* cdf, uint16_t* guide) {
+inline double make_cdf(const float* values, size_t n, float* cdf, uint32_t* guide) {
   const auto value = [&](size_t i) { return values[i] > 0.0f && std::isfinite(values[i]) ? double(values[i]) : 0.0; };
   double sum = 0, running = 0;
   for (size_t i = 0; i < n; ++i) sum += value(i);
@@ -19,7 +19,7 @@ inline double make_cdf(const float* values, size_t n, float* cdf, uint16_t* guid
     cdf[i + 1] = sum > 0 ? float(running / sum) : float(i + 1) / float(n);
   }
   cdf[n] = 1.0f;
-  uint16_t bin = 0;
+  uint32_t bin = 0;
   for (size_t k = 0; k < n; ++k) {
     guide[k] = bin;  // of the step before: rounding may put u a step too high, never more
     while (size_t(bin) + 1 < n && cdf[bin + 1] <= float(k) / float(n)) ++bin;
@@ -27,7 +27,7 @@ inline double make_cdf(const float* values, size_t n, float* cdf, uint16_t* guid
   return sum;
 }
 // The last bin that begins at or before u and is not empty; `u` becomes the place within it, again uniform.
-inline size_t find_bin(const float* cdf, const uint16_t* guide, size_t n, float& u) {
+inline size_t find_bin(const float* cdf, const uint32_t* guide, size_t n, float& u) {
   size_t i = guide[std::min(size_t(u * float(n)), n - 1)];
   while (i + 1 < n && cdf[i + 1] <= u) ++i;
   const float p = cdf[i + 1] - cdf[i];
@@ -49,7 +49,7 @@ class Distribution1D {
 
  private:
   std::vector<float> cdf_;
-  std::vector<uint16_t> guide_;
+  std::vector<uint32_t> guide_;
   double total_ = 0;
 };
 
@@ -84,7 +84,7 @@ class Distribution2D {
 
   size_t width_ = 0, height_ = 0;
   std::vector<float> cdf_;
-  std::vector<uint16_t> guide_;
+  std::vector<uint32_t> guide_;
   Distribution1D marginal_;
 };
 
