@@ -1,7 +1,7 @@
 """The command line: `gi-engine …`, and `blender -c gi_engine …` with the same commands.
 
 Exit codes: 0 done; 1 the render failed; 2 bad arguments (an input or output that cannot be used included);
-130 cancelled by Ctrl-C, with what was finished written. bpy is imported only once the arguments are known to be good.
+130 cancelled by Ctrl-C or SIGTERM, with what was finished written. bpy is imported only once the arguments are known to be good.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def run(argv: list[str], in_blender: bool = False) -> int:
 def render_command(arguments, out, err) -> int:
     check_render(arguments)
     wishes = Control(overrides=overrides(arguments), parameters=dict(arguments.set))
-    with controlled(wishes, err), ctrl_c(wishes):
+    with controlled(wishes, err), interruptible(wishes):
         headless = open_scene(arguments)
         scene = headless.bpy.context.scene
         settle(arguments, headless, scene)
@@ -133,7 +133,7 @@ def render_frame(arguments, headless, scene, frame: int, wishes: Control, displa
 def bake_command(arguments, out, err) -> int:
     paths = check_bake(arguments)
     wishes = Control(overrides=overrides(arguments), parameters=dict(arguments.set))
-    with controlled(wishes, err), ctrl_c(wishes):
+    with controlled(wishes, err), interruptible(wishes):
         headless = open_scene(arguments)
         chosen = find_integrator(arguments.integrator or headless.bpy.context.scene.gi_engine.integrator)
         check_parameters(chosen, wishes.parameters)
@@ -270,21 +270,21 @@ def controlled(wishes: Control, stream):
 
 
 @contextlib.contextmanager
-def ctrl_c(wishes: Control):
-    """The first Ctrl-C asks the render to stop and keep what it has; the second ends the program."""
+def interruptible(wishes: Control):
+    """The first Ctrl-C or SIGTERM asks the render to stop and keep what it has; the second ends the program."""
 
     def stop(*_):
         if wishes.cancelled:
             os._exit(CANCELLED)
         wishes.cancelled = True
 
-    try:
-        before = signal.signal(signal.SIGINT, stop)
-    except ValueError:  # not the main thread: whoever runs us handles signals
-        yield
-        return
+    before = {}
+    with contextlib.suppress(ValueError):  # not the main thread: whoever runs us handles signals
+        for number in (signal.SIGINT, signal.SIGTERM):
+            before[number] = signal.signal(number, stop)
     try:
         yield
     finally:
-        # The program's own handler, which Python knows only as None, cannot be put back.
-        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+        for number, handler in before.items():
+            # The program's own handler, which Python knows only as None, cannot be put back.
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)

@@ -159,7 +159,8 @@ def test_an_old_picture_is_replaced_only_by_a_whole_one(gi, stage, tmp_path):
     assert png_size(out) == (24, 16)
 
 
-def test_ctrl_c_keeps_what_is_there(gi, stage, tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_keeps_what_is_there(gi, stage, tmp_path, number):
     out, file = tmp_path / "out.png", stage.save()
     pressed = []
 
@@ -167,7 +168,7 @@ def test_ctrl_c_keeps_what_is_there(gi, stage, tmp_path):
         while not (control.current and control.current.last.passes):
             time.sleep(0.01)
         pressed.append(time.monotonic())
-        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), number)
 
     threading.Thread(target=press, daemon=True).start()
     done = gi("render", file, "-o", out, "--samples", 9999999)
@@ -177,6 +178,8 @@ def test_ctrl_c_keeps_what_is_there(gi, stage, tmp_path):
     assert "cancelled" in done.err
     assert png_size(out) == (24, 16)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert not list(tmp_path.glob(".gi-engine-*"))
 
 
 # A program that gets Ctrl-C as soon as it has a pass.
@@ -228,9 +231,9 @@ def test_ctrl_c_where_the_program_has_a_handler_of_its_own(monkeypatch):
     monkeypatch.setattr(cli.signal, "signal", lambda number, handler: handlers.append(real(number, handler)))
     before = signal.getsignal(signal.SIGINT)
     try:
-        with cli.ctrl_c(control.Control()):
+        with cli.interruptible(control.Control()):
             pass
-        assert handlers[0] is before and len(handlers) == 2
+        assert handlers[0] is before and len(handlers) == 4
         assert signal.getsignal(signal.SIGINT) is signal.SIG_DFL
     finally:
         real(signal.SIGINT, before)
