@@ -57,7 +57,7 @@ def limits(settings: Settings) -> str:
 
 
 def triangles(scene: Scene) -> str:
-    sizes = [len(mesh.tri_corner) for mesh in scene.meshes]
+    sizes = [mesh.triangle_count for mesh in scene.meshes]
     placed = sum(sizes[instance.mesh] * instance.count for instance in scene.instances)
     return f"triangles: {sum(sizes):,} stored, {placed:,} placed"
 

@@ -29,14 +29,18 @@ class Mesh:
     name: str
     positions: np.ndarray  # (V, 3) float32, object space; the native scene shares it and may move it to world space
     corner_vert: np.ndarray  # (C,) int32
-    tri_corner: np.ndarray  # (T, 3) int32
-    tri_face: np.ndarray | None  # (T,) int32, needed for FACE attributes and materials
+    tri_corner: np.ndarray | None  # (T, 3) int32; None: the faces are triangles, corners and faces as they come
+    tri_face: np.ndarray | None  # (T,) int32, needed for FACE attributes and materials where there is tri_corner
     face_material: np.ndarray | None  # (F,) int32 slot of each face; None: all 0
     normals_domain: str  # POINT, CORNER or FACE (flat)
     normals: np.ndarray | None  # (V or C, 3) float32, object space; None when flat
     attributes: list[Attribute] = field(default_factory=list)
     active_uv: str = ""  # the UV map that renders by default
     texture_space: tuple = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))  # location, size of Generated coordinates
+
+    @property
+    def triangle_count(self) -> int:
+        return len(self.corner_vert) // 3 if self.tri_corner is None else len(self.tri_corner)
 
 
 @dataclass

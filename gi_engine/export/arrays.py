@@ -43,6 +43,15 @@ def read_attribute(attribute) -> np.ndarray | None:
     return np.ascontiguousarray(values.reshape(-1, components), np.float32)
 
 
+def is_triangulated(mesh) -> bool:
+    """Whether every face is a triangle. Where each face begins lies in memory as int32, one after the other."""
+    faces, count = mesh.polygons, len(mesh.polygons)
+    if len(mesh.loops) != 3 * count or faces[count - 1].as_pointer() - faces[0].as_pointer() != 4 * (count - 1):
+        return False
+    starts = np.frombuffer((ctypes.c_int32 * count).from_address(faces[0].as_pointer()), np.int32)
+    return bool((starts == np.arange(0, 3 * count, 3, dtype=np.int32)).all())
+
+
 def triangle_corners(mesh) -> np.ndarray:
     """(T, 3) int32 corners of the triangles.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..nodes.attributes import ACTIVE_COLOR, UNDEFORMED
 from ..scene_data import Attribute, Mesh
-from .arrays import read, read_attribute, triangle_corners
+from .arrays import is_triangulated, read, read_attribute, triangle_corners
 
 
 def export_mesh(mesh, name: str, wanted: set[str], deformed: bool = False) -> Mesh | None:
@@ -19,8 +19,9 @@ def export_mesh(mesh, name: str, wanted: set[str], deformed: bool = False) -> Me
     """
     if not mesh.polygons:
         return None
-    tri_corner = triangle_corners(mesh)
-    if not len(tri_corner):
+    triangulated = is_triangulated(mesh)
+    tri_corner = None if triangulated else triangle_corners(mesh)
+    if not triangulated and not len(tri_corner):
         return None
     domain, normals = read_normals(mesh)
     material = mesh.attributes.get("material_index")  # absent where all are 0
@@ -34,7 +35,7 @@ def export_mesh(mesh, name: str, wanted: set[str], deformed: bool = False) -> Me
         positions=read_positions(mesh),
         corner_vert=read(mesh.attributes[".corner_vert"].data, "value", 1, np.int32),
         tri_corner=tri_corner,
-        tri_face=read(mesh.loop_triangle_polygons, "value", 1, np.int32) if by_face else None,
+        tri_face=read(mesh.loop_triangle_polygons, "value", 1, np.int32) if by_face and not triangulated else None,
         face_material=read(material.data, "value", 1, np.int32) if material else None,
         normals_domain=domain,
         normals=normals,

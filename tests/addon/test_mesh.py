@@ -19,12 +19,15 @@ def check_geometry(data, exported) -> None:
     assert exported.positions.shape == (len(data.vertices), 3)
     np.testing.assert_array_equal(exported.positions, [v.co[:] for v in data.vertices])
     triangles = [[data.loops[c].vertex_index for c in t.loops] for t in data.loop_triangles]
-    np.testing.assert_array_equal(exported.corner_vert[exported.tri_corner], triangles)
+    corners = slice(None) if exported.tri_corner is None else exported.tri_corner
+    np.testing.assert_array_equal(exported.corner_vert[corners].reshape(-1, 3), triangles)
+    assert exported.triangle_count == len(triangles)
     slots = [p.material_index for p in data.polygons]
     if not any(slots):
         assert exported.face_material is None and exported.tri_face is None
         return
-    np.testing.assert_array_equal(exported.tri_face, [t.polygon_index for t in data.loop_triangles])
+    faces = np.arange(len(triangles)) if exported.tri_corner is None else exported.tri_face
+    np.testing.assert_array_equal(faces, [t.polygon_index for t in data.loop_triangles])
     np.testing.assert_array_equal(exported.face_material, slots)
 
 
@@ -36,6 +39,31 @@ def test_geometry_of_a_mixed_mesh(scene):
     item = add(scene, "Mixed", data)
     found = evaluated(item)
     check_geometry(found, export_mesh(found, "Mixed", set()))
+
+
+@pytest.mark.parametrize("slots", [1, 3])
+def test_geometry_of_triangles_alone(scene, slots):
+    """Goes over as it is."""
+    data = mesh(
+        vertices=np.random.default_rng(1).random((9, 3)).tolist(), faces=[(0, 1, 2), (4, 3, 1), (8, 5, 2), (2, 6, 7)]
+    )
+    if slots > 1:
+        data.polygons[2].material_index = slots - 1
+    found = evaluated(add(scene, "Triangles", data))
+    exported = export_mesh(found, "Triangles", set())
+    assert exported.tri_corner is None and exported.tri_face is None
+    found.calc_loop_triangles()
+    corners = [tuple(t.loops) for t in found.loop_triangles]
+    assert corners == [(k, k + 1, k + 2) for k in range(0, 12, 3)]
+    assert [t.polygon_index for t in found.loop_triangles] == [0, 1, 2, 3]
+    assert exported.corner_vert.tolist() == [0, 1, 2, 4, 3, 1, 8, 5, 2, 2, 6, 7]
+    assert (exported.face_material is None) == (slots == 1)
+
+
+def test_a_face_of_two_corners_is_not_a_triangle(scene):
+    data = mesh(vertices=[(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], faces=[(0, 1), (0, 1, 2, 3)])
+    exported = export_mesh(data, "Odd", set())
+    assert exported.triangle_count == 2
 
 
 def test_geometry_without_materials(scene):

@@ -40,8 +40,8 @@ def test_modifiers_and_their_render_levels_count(scene, render_export):
     off = add(scene, "Plain", mesh()).modifiers.new("Array", "ARRAY")
     off.show_render = False
     exported = render_export()
-    assert len(named(exported.scene.meshes, "Smooth").tri_corner) == 2 * 4**3
-    assert len(named(exported.scene.meshes, "Plain").tri_corner) == 2
+    assert named(exported.scene.meshes, "Smooth").triangle_count == 2 * 4**3
+    assert named(exported.scene.meshes, "Plain").triangle_count == 2
 
 
 def test_hidden_objects_are_left_out(scene, render_export):
@@ -153,7 +153,7 @@ def test_what_is_not_a_mesh_comes_once_as_one(scene, render_export, make):
     instance = named(exported.scene.instances, item.name)
     assert program_names(exported, instance) == ["paint"]
     np.testing.assert_allclose(instance.matrix[:3, 3], (1, 2, 3))
-    assert len(exported.scene.meshes[instance.mesh].tri_corner) > 10
+    assert exported.scene.meshes[instance.mesh].triangle_count > 10
 
 
 def test_collection_instances_nest(scene, render_export):
@@ -248,7 +248,7 @@ def test_geometry_nodes_instances(scene, render_export):
     exported = render_export()
     (cubes,) = exported.scene.instances
     assert cubes.count == 16 and len(exported.scene.meshes) == 1
-    assert len(exported.scene.meshes[0].tri_corner) == 12
+    assert exported.scene.meshes[0].triangle_count == 12
     expected = sorted((np.array(v.co) + (0, 0, 1)).tolist() for v in carrier.data.vertices)
     np.testing.assert_allclose(places(cubes), expected, atol=1e-6)
     assert not exported.warnings

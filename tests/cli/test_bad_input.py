@@ -197,6 +197,16 @@ def test_vertices_that_are_not_numbers(warns, stage):
     assert np.all(warns(stage.save(), "broken") >= 0)
 
 
+def test_a_mesh_of_triangles_keeps_those_that_are_sound(warns, stage):
+    mesh = plane("shards", ())
+    corners = [(x, y, 1) for x in range(3) for y in (0, 1)]
+    mesh.from_pydata([*corners, (0, 0, 2)], [], [(0, 1, 6), (0, 1, 2), (2, 3, 4)])
+    mesh.polygons[2].material_index = 1
+    mesh.vertices[6].co = (float("nan"), 0, 0)
+    stage.add("shards", mesh)
+    assert np.all(warns(stage.save(), "shards", "1 triangles") >= 0)
+
+
 def test_vertices_at_the_end_of_the_number_range(warns, stage):
     mesh = plane("vast", ((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)))
     mesh.vertices[2].co = (float("inf"), 0, 0)  # Blender makes it 3.4e38

@@ -6,7 +6,7 @@ The density is checked where the light arrives: on a sphere about (or within) th
 import numpy as np
 import pytest
 from light_scenes import build, emission, f32, lamp, matrix, triangle_scene, with_world
-from scipy import stats
+from scipy import integrate, stats
 
 from gi_engine import scene_data as sd
 from gi_engine.nodes.program import ProgramBuilder
@@ -149,7 +149,7 @@ def cone_power(size, blend):
     """Of a spot of 1 W: the share of the sphere, its edge a smoothstep."""
     c = np.linspace(np.cos(size / 2), 1, 200_001)
     s = np.clip((c - np.cos(size / 2)) / ((1 - np.cos(size / 2)) * blend), 0, 1)
-    return np.trapezoid(s * s * (3 - 2 * s), c) / 2
+    return integrate.trapezoid(s * s * (3 - 2 * s), c) / 2
 
 
 AREA = sum(0.5 * np.linalg.norm(np.cross(np.subtract(t[1], t[0]), np.subtract(t[2], t[0]))) for t in TRIANGLES)

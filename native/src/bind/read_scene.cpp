@@ -126,6 +126,7 @@ MeshData read_mesh(const Record& r) {
   m.name = r.get<std::string>("name");
   m.positions = padded_positions(r);
   m.corner_vert = r.array<const int32_t>("corner_vert");
+  m.triangulated = r.at("tri_corner").is_none();
   m.tri_corner = r.array<const int32_t>("tri_corner");
   m.tri_face = r.array<const int32_t>("tri_face");
   m.face_material = r.array<const int32_t>("face_material");

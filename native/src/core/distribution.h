@@ -7,8 +7,8 @@
 
 namespace gi {
 
-// The cumulative sums of `n` values (fewer than 2³²), which the caller keeps: cdf[0] = 0 … cdf[n] = 1. `guide`: for each of n even steps of u, where
-// the search begins. [Chen & Asau 1974, "On generating random variates from an empirical distribution"]
+// The cumulative sums of `n` values (fewer than 2³²), which the caller keeps: cdf[0] = 0 … cdf[n] = 1. `guide`: for each of n even steps of
+// u, where the search begins. [Chen & Asau 1974, "On generating random variates from an empirical distribution"]
 inline double make_cdf(const float* values, size_t n, float* cdf, uint32_t* guide) {
   const auto value = [&](size_t i) { return values[i] > 0.0f && std::isfinite(values[i]) ? double(values[i]) : 0.0; };
   double sum = 0, running = 0;

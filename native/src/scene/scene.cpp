@@ -36,8 +36,14 @@ Scene::~Scene() = default;
 
 void Scene::index_vertices() {
   for (const MeshData& mesh : data_.meshes) {
-    std::vector<uint32_t>& indices = indices_.emplace_back(mesh.tri_corner.size);
-    for (size_t k = 0; k < indices.size(); ++k) indices[k] = uint32_t(mesh.corner_vert[size_t(mesh.tri_corner[k])]);
+    if (mesh.triangulated) {
+      const Array<const int32_t>& corners = mesh.corner_vert;
+      indices_.push_back({reinterpret_cast<const uint32_t*>(corners.data), corners.size, corners.owner});
+      continue;
+    }
+    auto indices = std::make_shared<std::vector<uint32_t>>(mesh.tri_corner.size);
+    for (size_t k = 0; k < indices->size(); ++k) (*indices)[k] = uint32_t(mesh.corner_vert[size_t(mesh.tri_corner[k])]);
+    indices_.push_back({indices->data(), indices->size(), indices});
   }
 }
 
@@ -111,7 +117,7 @@ std::vector<CornerTangent> Scene::tangents_of(uint32_t m, int slot) const {
   const MeshData& mesh = data_.meshes[m];
   const int32_t index = attribute_index_[m][size_t(slot)];
   if (index < 0 && !data_.attribute_names[size_t(slot)].empty()) return {};
-  std::vector<TangentCorner> corners(mesh.tri_corner.size);
+  std::vector<TangentCorner> corners(indices_[m].size);
   ShadingPoint point;
   for (size_t c = 0; c < corners.size(); ++c) {
     const float* p = mesh.positions.data + 3 * size_t(indices_[m][c]);
@@ -135,7 +141,7 @@ void Scene::build_accel(const std::string& embree, int threads) {
   std::vector<AccelMesh> meshes;
   for (size_t m = 0; m < data_.meshes.size(); ++m) {
     const MeshData& mesh = data_.meshes[m];
-    meshes.push_back({mesh.positions.data, mesh.vertex_count(), indices_[m].data(), mesh.triangle_count()});
+    meshes.push_back({mesh.positions.data, mesh.vertex_count(), indices_[m].data, mesh.triangle_count()});
   }
   std::vector<AccelInstance> placed;
   for (const Instance& i : instances_) {
@@ -172,7 +178,7 @@ Vec3 Scene::vertex(const Instance& instance, uint32_t v) const {
 
 void Scene::triangle_vertices(uint32_t instance, uint32_t triangle, Vec3 out[3]) const {
   const Instance& placed = instances_[instance];
-  const uint32_t* v = indices_[placed.mesh].data() + 3 * size_t(triangle);
+  const uint32_t* v = indices_[placed.mesh].data + 3 * size_t(triangle);
   for (int k = 0; k < 3; ++k) out[k] = vertex(placed, v[k]);
 }
 
@@ -180,7 +186,7 @@ void Scene::triangle_vertices(uint32_t instance, uint32_t triangle, Vec3 out[3])
 Vec3 Scene::corner_normal(uint32_t m, uint32_t triangle, int k) const {
   const MeshData& mesh = data_.meshes[m];
   const size_t at = 3 * size_t(triangle) + size_t(k);
-  const float* q = mesh.normals.data + 3 * size_t(mesh.normals_domain == Domain::kPoint ? indices_[m][at] : uint32_t(mesh.tri_corner[at]));
+  const float* q = mesh.normals.data + 3 * size_t(mesh.normals_domain == Domain::kPoint ? indices_[m][at] : mesh.corner(at));
   return {q[0], q[1], q[2]};
 }
 
@@ -189,7 +195,7 @@ int Scene::material_of(uint32_t instance, uint32_t triangle) const {
   const MeshData& mesh = data_.meshes[placed.mesh];
   const std::vector<int32_t>& slots = placed.data->materials;
   if (mesh.face_material.empty()) return slots[0];
-  const int slot = mesh.face_material[size_t(mesh.tri_face[triangle])];
+  const int slot = mesh.face_material[mesh.face(triangle)];
   return slots[size_t(std::clamp(slot, 0, int(slots.size()) - 1))];
 }
 
@@ -377,14 +383,14 @@ void Scene::interpolate(uint32_t m, const AttributeData& a, const ShadingPoint& 
   const MeshData& mesh = data_.meshes[m];
   const size_t n = size_t(a.components);
   if (a.domain == Domain::kFace) {
-    std::copy_n(a.data.data + size_t(mesh.tri_face[point.triangle]) * n, n, out);
+    std::copy_n(a.data.data + mesh.face(point.triangle) * n, n, out);
     return;
   }
   const size_t first = 3 * size_t(point.triangle);
   const float w[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
   float sum[4] = {0, 0, 0, 0};
   for (size_t k = 0; k < 3; ++k) {
-    const size_t at = a.domain == Domain::kPoint ? indices_[m][first + k] : size_t(mesh.tri_corner[first + k]);
+    const size_t at = a.domain == Domain::kPoint ? indices_[m][first + k] : mesh.corner(first + k);
     for (size_t c = 0; c < n; ++c) sum[c] += w[k] * a.data[at * n + c];
   }
   std::copy_n(sum, n, out);

@@ -104,7 +104,7 @@ class Scene {
   std::vector<std::vector<int32_t>> attribute_index_;  // per mesh and slot: which of its attributes, or -1
   std::vector<std::vector<std::vector<CornerTangent>>> tangents_;  // per mesh and slot: of each corner of its triangles, or none
   std::vector<int32_t> active_uv_;                     // per mesh: which attribute, or -1
-  std::vector<std::vector<uint32_t>> indices_;         // per mesh: Embree's index buffer
+  std::vector<Array<const uint32_t>> indices_;         // per mesh: Embree's index buffer
   std::unique_ptr<ShaderResources> resources_;
   std::unique_ptr<Accel> accel_;
   mutable std::array<RayCounter, kRayCounters> rays_;

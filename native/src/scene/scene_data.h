@@ -32,12 +32,16 @@ struct MeshData {
   std::string name;
   Array<float> positions;  // 3 per vertex; taken over: moved to world space where one instance alone uses the mesh
   Array<const int32_t> corner_vert, tri_corner, tri_face, face_material;
+  bool triangulated = false;  // all faces are triangles: no tri_corner, no tri_face
   Domain normals_domain = Domain::kFace;
   Array<const float> normals;
   std::vector<AttributeData> attributes;
   std::string active_uv;
   Vec3 texture_location, texture_size{1, 1, 1};
-  size_t triangle_count() const { return tri_corner.size / 3; }
+  size_t triangle_count() const { return (triangulated ? corner_vert.size : tri_corner.size) / 3; }
+  size_t corner(size_t k) const { return triangulated ? k : size_t(tri_corner[k]); }  // 3 per triangle
+  bool has_faces() const { return triangulated || !tri_face.empty(); }
+  size_t face(size_t triangle) const { return triangulated ? triangle : size_t(tri_face[triangle]); }
   size_t vertex_count() const { return positions.size / 3; }
 };
 

@@ -10,9 +10,9 @@ namespace {
 // A broken triangle: one that names a vertex that is not there, or whose vertices are not all finite.
 bool triangle_is_sound(const MeshData& mesh, size_t t) {
   for (int k = 0; k < 3; ++k) {
-    const int32_t corner = mesh.tri_corner[3 * t + size_t(k)];
-    if (corner < 0 || size_t(corner) >= mesh.corner_vert.size) return false;
-    const int32_t v = mesh.corner_vert[size_t(corner)];
+    const size_t corner = mesh.corner(3 * t + size_t(k));  // a negative one is out of range, too
+    if (corner >= mesh.corner_vert.size) return false;
+    const int32_t v = mesh.corner_vert[corner];
     if (v < 0 || size_t(v) >= mesh.vertex_count()) return false;
     const float* p = mesh.positions.data + 3 * size_t(v);
     if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) return false;
@@ -33,13 +33,14 @@ void drop_broken_triangles(MeshData& mesh, std::vector<std::string>& warnings) {
   std::vector<int32_t> corners, faces;
   for (size_t t = 0; t < n; ++t) {
     if (!triangle_is_sound(mesh, t)) continue;
-    corners.insert(corners.end(), mesh.tri_corner.data + 3 * t, mesh.tri_corner.data + 3 * t + 3);
-    if (!mesh.tri_face.empty()) faces.push_back(mesh.tri_face[t]);
+    for (size_t k = 0; k < 3; ++k) corners.push_back(int32_t(mesh.corner(3 * t + k)));
+    if (mesh.has_faces()) faces.push_back(int32_t(mesh.face(t)));
   }
   warnings.push_back("mesh '" + mesh.name + "': " + std::to_string(n - corners.size() / 3) +
                      " triangles with vertices that are not finite or out of range are left out");
   mesh.tri_corner = owned(std::move(corners));
-  if (!mesh.tri_face.empty()) mesh.tri_face = owned(std::move(faces));
+  if (mesh.has_faces()) mesh.tri_face = owned(std::move(faces));
+  mesh.triangulated = false;
 }
 
 size_t elements(const MeshData& mesh, Domain domain, size_t faces) {
@@ -50,15 +51,17 @@ void validate_mesh(MeshData& mesh, std::vector<std::string>& warnings) {
   const std::string who = "mesh '" + mesh.name + "': ";
   require(mesh.positions.size % 3 == 0, who + "positions must have 3 columns");
   require(mesh.tri_corner.size % 3 == 0, who + "tri_corner must have 3 columns");
+  require(!mesh.triangulated || mesh.corner_vert.size % 3 == 0, who + "without tri_corner, corner_vert must hold triangles");
+  require(!mesh.triangulated || mesh.tri_face.empty(), who + "tri_face needs tri_corner");
   require(mesh.tri_face.empty() || mesh.tri_face.size == mesh.triangle_count(), who + "tri_face must have one entry for each triangle");
+  size_t faces = mesh.triangulated ? mesh.triangle_count() : mesh.face_material.size;
   drop_broken_triangles(mesh, warnings);
-  size_t faces = mesh.face_material.size;
   for (size_t t = 0; t < mesh.tri_face.size; ++t) {
     require(mesh.tri_face[t] >= 0, who + "tri_face holds a negative index");
     faces = std::max(faces, size_t(mesh.tri_face[t]) + 1);
   }
   require(mesh.face_material.empty() || mesh.face_material.size == faces, who + "tri_face is out of the range of face_material");
-  require(mesh.face_material.empty() || !mesh.tri_face.empty() || mesh.triangle_count() == 0, who + "face_material needs tri_face");
+  require(mesh.face_material.empty() || mesh.has_faces() || mesh.triangle_count() == 0, who + "face_material needs tri_face");
   if (mesh.normals_domain != Domain::kFace) {
     const size_t want = 3 * elements(mesh, mesh.normals_domain, faces);
     require(mesh.normals.size == want,
@@ -66,7 +69,7 @@ void validate_mesh(MeshData& mesh, std::vector<std::string>& warnings) {
   }
   for (const AttributeData& a : mesh.attributes) {
     require(a.components >= 1 && a.components <= 4, who + "attribute '" + a.name + "' must have 1 to 4 components");
-    require(a.domain != Domain::kFace || !mesh.tri_face.empty() || mesh.triangle_count() == 0,
+    require(a.domain != Domain::kFace || mesh.has_faces() || mesh.triangle_count() == 0,
             who + "attribute '" + a.name + "' on faces needs tri_face");
     const size_t least = elements(mesh, a.domain, faces) * size_t(a.components);
     require(a.data.size >= least,

@@ -105,7 +105,7 @@ Lightmap::Lightmap(const Scene& scene, LightmapSpec spec, int width, int height)
 void Lightmap::corners(uint32_t triangle, Vec2 out[3]) const {
   const MeshData& mesh = scene_.mesh(scene_.instances()[instance_].mesh);
   for (size_t k = 0; k < 3; ++k) {
-    const size_t corner = size_t(mesh.tri_corner[3 * size_t(triangle) + k]);
+    const size_t corner = mesh.corner(3 * size_t(triangle) + k);
     out[k] = {map_->data[2 * corner] * float(width_), map_->data[2 * corner + 1] * float(height_)};
   }
 }
