@@ -1,0 +1,218 @@
+"""Error against a long reference over time: GI Engine's path tracing and bidirectional path tracing, and Cycles, in one run.
+
+    python bench/equal_time.py [--pixels N] [--seconds S …] [--seeds N] [--reference S] [--ways NAME …] [WORD …]
+
+Each way renders each scene (files, or words in names of the shared scenes) for about S seconds of sampling, once per seed, in a process of
+its own. The error is the relative mean squared one, (x − r)² / (r² + (mean r / 10)²), of the worst pixels without a thousandth; `spread` is
+the same between seeds, which no difference between the engines can touch. The reference is a long render by another seed and the way that is
+least noisy per second. Denoising, adaptive sampling, clamping and Filter Glossy are off, caustics are on, bounces are the scene's own.
+Writes bench/results/equal_time.json, .md, and pictures side by side."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+from measure import ROOT, prepare, scenes
+
+WAYS = {
+    "path": ("GI_ENGINE", "path"),
+    "bdpt": ("GI_ENGINE", "bdpt"),
+    "light": ("GI_ENGINE", "light"),
+    "cycles": ("CYCLES", ""),
+}
+RESULTS = ROOT / "bench" / "results"
+LIMIT = 1800  # seconds
+
+
+# -------------------------------------------------------------------------------------------------- in the child
+
+
+def render_all(options) -> None:
+    """Images of one way for each of the times and seeds, as options.into/<seconds>_<seed>.npy; prints their times."""
+    import bpy
+
+    import gi_engine
+
+    gi_engine.register()
+    bpy.ops.wm.open_mainfile(filepath=options.child, load_ui=False, use_scripts=False)
+    scene = bpy.context.scene
+    engine, integrator = WAYS[options.ways[0]]
+    prepare(scene, SimpleNamespace(engine=engine, pixels=options.pixels, threads=options.threads))
+    cycles = scene.cycles
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.blur_glossy = 0.0
+    cycles.caustics_reflective = cycles.caustics_refractive = True
+    cycles.use_animated_seed = False
+    scene.gi_engine.is_own = False
+    if integrator:
+        scene.gi_engine.integrator = integrator
+
+    def timed(samples: int, seed: int) -> float:
+        cycles.samples, cycles.seed = samples, seed
+        start = time.perf_counter()
+        bpy.ops.render.render(scene=scene.name)
+        return time.perf_counter() - start
+
+    timed(1, 1)
+    start = timed(1, 1)
+    samples, seconds = 2, 0.0
+    while seconds < 0.3 * min(options.seconds):
+        samples *= 2
+        seconds = timed(samples, 2) - start
+    rate = (samples - 1) / seconds
+    found = []
+    for wanted in options.seconds:
+        for seed in range(1, options.seeds + 1):
+            took = timed(n := max(2, round(wanted * rate)), 100 * options.first_seed + seed) - start
+            name = f"{wanted:g}_{seed}"
+            np.save(Path(options.into) / name, picture(bpy, options.into))
+            found.append({"name": name, "wanted": wanted, "seconds": took, "samples": n})
+    print("FOUND" + json.dumps(found), flush=True)
+
+
+def picture(bpy, folder: str) -> np.ndarray:
+    """(height, width, 3) scene-linear."""
+    scene = bpy.context.scene
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGBA"
+    path = str(Path(folder) / "picture.exr")
+    bpy.data.images["Render Result"].save_render(path, scene=scene)
+    image = bpy.data.images.load(path)
+    image.colorspace_settings.name = "Non-Color"
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    width, height = image.size
+    bpy.data.images.remove(image)
+    return pixels.reshape(height, width, -1)[..., :3]
+
+
+# -------------------------------------------------------------------------------------------------- in the parent
+
+
+def run_child(file: Path, way: str, options, seconds, seeds: int, first_seed: int) -> list[dict]:
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, __file__, "--child", str(file), "--into", folder, "--ways", way]
+        command += ["--pixels", str(options.pixels), "--threads", str(options.threads), "--seeds", str(seeds)]
+        command += ["--first-seed", str(first_seed), "--seconds", *map(str, seconds)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
+        lines = [line for line in done.stdout.splitlines() if line.startswith("FOUND")]
+        if not lines:
+            raise SystemExit(f"{file.stem}, {way}: {done.stderr.strip()[-800:]}")
+        found = json.loads(lines[-1][5:])
+        for one in found:
+            one["image"] = np.load(Path(folder) / f"{one['name']}.npy").astype(np.float64)
+    return found
+
+
+def relative_error(image: np.ndarray, reference: np.ndarray) -> float:
+    floor = (0.1 * reference.mean()) ** 2
+    errors = ((image - reference) ** 2 / (reference**2 + floor)).mean(-1).ravel()
+    return float(np.sort(errors)[: math.ceil(0.999 * len(errors))].mean())
+
+
+def spread(images: list[np.ndarray], reference: np.ndarray) -> float:
+    """Relative variance of one image, by differences in pairs."""
+    pairs = [(a, b) for i, a in enumerate(images) for b in images[i + 1 :]]
+    return float(np.mean([relative_error(reference + (a - b) / math.sqrt(2), reference) for a, b in pairs]))
+
+
+def measure_scene(file: Path, options) -> dict:
+    found = {way: run_child(file, way, options, options.seconds, options.seeds, 1) for way in options.ways}
+    last = {way: [o["image"] for o in found[way] if o["wanted"] == options.seconds[-1]] for way in options.ways}
+    rough = np.mean([image for images in last.values() for image in images], 0)
+    calmest = min((w for w in options.ways if w != "cycles"), key=lambda w: spread(last[w], rough))
+    reference = run_child(file, calmest, options, [options.reference], 1, 7)[0]["image"]
+    row = {"scene": file.stem, "reference": calmest, "ways": {}}
+    for way in options.ways:
+        row["ways"][way] = []
+        for wanted in options.seconds:
+            group = [o for o in found[way] if o["wanted"] == wanted]
+            row["ways"][way].append(
+                {
+                    "seconds": float(np.mean([o["seconds"] for o in group])),
+                    "samples": group[0]["samples"],
+                    "error": float(np.mean([relative_error(o["image"], reference) for o in group])),
+                    "spread": spread([o["image"] for o in group], reference),
+                }
+            )
+    save_pictures(file.stem, reference, {way: images[0] for way, images in last.items()})
+    return row
+
+
+def save_pictures(stem: str, reference: np.ndarray, images: dict) -> None:
+    """The reference and the last picture of each way, side by side, in their order."""
+    import bpy
+
+    bright = 0.7 / max(float(np.percentile(reference, 90)), 1e-9)
+    strip = np.concatenate([reference, *images.values()], 1) * bright
+    srgb = np.where(strip < 0.0031308, 12.92 * strip, 1.055 * np.maximum(strip, 1e-9) ** (1 / 2.4) - 0.055).clip(0, 1)
+    height, width, _ = srgb.shape
+    image = bpy.data.images.new("strip", width, height)
+    image.pixels.foreach_set(np.dstack([srgb, np.ones((height, width))]).astype(np.float32).ravel())
+    image.filepath_raw, image.file_format = str(RESULTS / f"equal_time_{stem}.png"), "PNG"
+    image.save()
+
+
+def table(rows: list[dict], options) -> str:
+    lines = [
+        f"# Error at equal time\n\n{options.threads} threads, {options.pixels} pixels, means of {options.seeds} seeds.\n",
+        "| scene | way | seconds | samples | relative MSE | between seeds | times Cycles' |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        for way, steps in row["ways"].items():
+            for k, step in enumerate(steps):
+                theirs = row["ways"].get("cycles")
+                ratio = (
+                    f"{step['spread'] * step['seconds'] / (theirs[k]['spread'] * theirs[k]['seconds']):.2f}"
+                    if theirs
+                    else "–"
+                )
+                lines.append(
+                    f"| {row['scene']} | {way} | {step['seconds']:.1f} | {step['samples']} | {step['error']:.4f} | {step['spread']:.4f} | {ratio} |"
+                )
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("words", nargs="*")
+    parser.add_argument("--ways", nargs="+", choices=WAYS, default=["path", "bdpt", "cycles"])
+    parser.add_argument("--seconds", nargs="+", type=float, default=[4.0, 16.0])
+    parser.add_argument("--reference", type=float, default=120.0)
+    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--pixels", type=int, default=20_000)
+    parser.add_argument("--threads", type=int, default=2)
+    for hidden in ("--child", "--into"):
+        parser.add_argument(hidden, help=argparse.SUPPRESS)
+    parser.add_argument("--first-seed", type=int, default=1, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.child:
+        render_all(options)
+        sys.stdout.flush()
+        os._exit(0)  # Blender's module can hang at exit
+    files = [Path(w) for w in options.words if w.endswith(".blend")] or scenes(options.words)
+    RESULTS.mkdir(exist_ok=True)
+    rows = []
+    for file in files:
+        rows.append(measure_scene(file, options))
+        text = table(rows, options)
+        (RESULTS / "equal_time.json").write_text(json.dumps(rows, indent=1) + "\n")
+        (RESULTS / "equal_time.md").write_text(text)
+        print(text, flush=True)
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
