@@ -2,6 +2,7 @@
 // other, all ways to make the same path weighed against one another [Lafortune & Willems 1993; Veach 1997, ch. 10].
 #include "integrators/integrator.h"
 #include "transport/camera_path.h"
+#include "transport/light_path.h"
 #include "transport/subpath.h"
 
 namespace gi {
@@ -38,13 +39,12 @@ class BdptIntegrator final : public Integrator {
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     const FilmSpec& spec = film.spec();
     if (pass == 0) film.start_splats(splat_unit(context));
-    s_.pixel = {1.0f / float(spec.width), 1.0f / float(spec.height)};
-    for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) {
+    s_.footprint = {context.camera, spec.width, spec.height};
+    for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result, uint32_t pixel) {
       static thread_local LightSubpath light;
-      constexpr uint32_t kLightStream = 0x6c696768u;
-      Sampler light_sampler = sampler.fork(kLightStream);
-      trace_from_light(context, s_, light_sampler, light);
-      splat(context, film, light_sampler, light);
+      Sampler from_light = light_sampler(context, pass, spec.width * spec.height, pixel);
+      trace_from_light(context, s_, from_light, light);
+      splat(context, film, from_light, light);
       trace(context, film, camera, light, sampler, result);
     });
     film.end_splats(!context.cancelled);
@@ -162,7 +162,7 @@ class BdptIntegrator final : public Integrator {
       path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
 
       // Russian roulette.
-      const float alpha = path.state.depth <= min_bounces_ ? 1.0f : std::min(1.0f, std::sqrt(max_component(path.throughput)));
+      const float alpha = path.state.depth <= min_bounces_ ? 1.0f : std::min(1.0f, max_component(path.throughput));
       if (alpha < 1.0f) {
         if (sampler.next_1d() >= alpha) break;
         path.throughput *= 1.0f / alpha;
@@ -197,6 +197,8 @@ class BdptIntegrator final : public Integrator {
     const float distance = length(to);
     if (!(distance > 0.0f)) return Rgb();
     const Vec3 w = to / distance;
+    const float cos_z = dot(z.point.ng, w), cos_y = -dot(y.point.ng, w);
+    if ((cos_z < 0.0f && !(z.bsdf.flags() & kTransmission)) || (cos_y < 0.0f && !(y.bsdf.flags() & kTransmission))) return Rgb();
 
     // Bounces as Blender counts them.
     const uint8_t at_z = bounce_flags(z.bsdf, z.point, w);
@@ -212,13 +214,14 @@ class BdptIntegrator final : public Integrator {
     if (is_black(from_z.value)) return Rgb();
     const LobeEval at_y = eval_turned(context, y.point, y.bsdf, -w, unknown_state(), y.seen_by);
     if (is_black(at_y.value)) return Rgb();
-    const float cos_y = abs_dot(y.point.ng, w), cos_z = abs_dot(z.point.ng, w), inv_d2 = 1.0f / sqr(distance);
-    const Rgb value = y.power * at_y.value * from_z.value * (cos_y * inv_d2 / abs_dot(y.point.ng, y.point.wo));
+    const float to_y = std::abs(cos_y) / sqr(distance),
+                to_z = std::abs(cos_z) / sqr(distance);  // densities per area, for those per steradian
+    const Rgb value = y.power * at_y.value * from_z.value * (to_y / abs_dot(y.point.ng, y.point.wo));
 
     // The weight. [Georgiev 2012, eq. 37, 38, 40, 41]
     const float pdf_y = y.bsdf.eval(y.point.wo, -w).pdf_dir;
-    const float others = y.weights.sum(h, from_z.pdf_dir * cos_y * inv_d2, at_y.pdf_dir) +
-                         z.weights.sum(h, pdf_y * cos_z * inv_d2, z.weights.vc > 0.0f ? reverse(context, z, w).pdf_dir : 0.0f);
+    const float others = y.weights.sum(h, from_z.pdf_dir * to_y, at_y.pdf_dir) +
+                         z.weights.sum(h, pdf_y * to_z, z.weights.vc > 0.0f ? reverse(context, z, w).pdf_dir : 0.0f);
     const Rgb contribution = value * strategies_.weight(k + 2, z.state.depth + 2, 1.0f / (1.0f + others));
     if (is_black(contribution)) return Rgb();
 

@@ -18,7 +18,7 @@ class LightIntegrator final : public Integrator {
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     if (pass == 0) film.start_splats(splat_unit(context));
-    s_.pixel = {1.0f / float(film.spec().width), 1.0f / float(film.spec().height)};
+    s_.footprint = {context.camera, film.spec().width, film.spec().height};
     for_each_pixel(context, pass, film,
                    [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) { look(context, film, camera, sampler, result); });
     const int count = film.spec().region_width() * film.spec().region_height();

@@ -1,6 +1,8 @@
 // What every path from the camera does: it begins at each pixel, and at each ray it leaves the scene or arrives at a surface,
 // of which the first that is not see-through fills the data passes.
 #pragma once
+#include <type_traits>
+
 #include "core/sampler.h"
 #include "film/film.h"
 #include "transport/direct_light.h"
@@ -39,7 +41,8 @@ struct CameraRow {
   }
 };
 
-// Calls f(camera ray, sampler, sample to fill) for every pixel of the film, tile by tile in threads.
+// Calls f(camera ray, sampler, sample to fill) for every pixel of the film, tile by tile in threads. Where f takes a fourth argument,
+// it is the pixel's number in the full frame.
 template <class F>
 void for_each_pixel(const RenderContext& context, int pass, Film& film, const F& f) {
   const FilmSpec& spec = film.spec();
@@ -51,7 +54,10 @@ void for_each_pixel(const RenderContext& context, int pass, Film& film, const F&
       for (int i = 0; i < tile.x1 - tile.x0; ++i) {
         if (context.lightmap && !context.lightmap->covers(spec.x0 + tile.x0 + i, spec.y0 + y)) continue;
         Sampler sampler = row.samplers.sampler(i);
-        f(row.rays[i], sampler, samples[i]);
+        if constexpr (std::is_invocable_v<F, const CameraRay&, Sampler&, PixelSample&, uint32_t>)
+          f(row.rays[i], sampler, samples[i], uint32_t(spec.y0 + y) * uint32_t(spec.width) + uint32_t(spec.x0 + tile.x0 + i));
+        else
+          f(row.rays[i], sampler, samples[i]);
       }
       film.add_row(index, y, pass, samples);
     }

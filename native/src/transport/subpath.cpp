@@ -36,12 +36,6 @@ LobeEval eval_seen_by(const Bsdf& bsdf, Vec3 wo, Vec3 wi, uint32_t seen_by) {
   return eval_for_light(bsdf, wo, light);
 }
 
-float footprint_at(const Camera& camera, const Vec2& pixel, Vec3 position) {
-  const CameraRay middle = camera.sample({0.5f, 0.5f}, pixel, {0.5f, 0.5f});
-  const float at_lens = middle.footprint - middle.spread * camera.clip_start;
-  return at_lens + middle.spread * length(position - camera.to_world.translation());
-}
-
 LobeEval eval_turned(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, Vec3 w, const PathState& path,
                      uint32_t seen_by) {
   const Program& program = context.scene.material(context.scene.material_of(point.instance, point.triangle)).program;
@@ -102,7 +96,7 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
       ray = {offset_point(v.point.position, v.point.ng, ray.direction), ray.direction};
       continue;
     }
-    v.point.footprint = footprint_at(context.camera, settings.pixel, v.point.position);
+    v.point.footprint = settings.footprint(v.point.position);
     context.scene.shade(v.point, v.bsdf);
     const float cos_in = abs_dot(v.point.ng, v.point.wo);
     v.bounces = carried.bounces, v.seen_by = carried.seen_by, v.is_first = carried.is_first;

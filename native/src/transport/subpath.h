@@ -61,17 +61,26 @@ struct LightSubpath {
   int max_bounces = 1024;  // of the luminaire
 };
 
+// The radius of a pixel on a surface that is seen directly: what textures and bumps of both kinds of subpath are filtered by.
+struct PixelFootprint {
+  Vec3 lens;
+  float at_lens = 0, per_metre = 0;
+  PixelFootprint() = default;
+  PixelFootprint(const Camera& camera, int width, int height) : lens(camera.to_world.translation()) {
+    const CameraRay middle = camera.sample({0.5f, 0.5f}, {1.0f / float(width), 1.0f / float(height)}, {0.5f, 0.5f});
+    per_metre = middle.spread, at_lens = middle.footprint - middle.spread * camera.clip_start;
+  }
+  float operator()(Vec3 position) const { return at_lens + per_metre * length(position - lens); }
+};
+
 struct SubpathSettings {
   BounceLimits limits;
   Heuristic heuristic{};
-  Vec2 pixel{1e-3f, 1e-3f};  // its size over the full frame
+  PixelFootprint footprint{};
 };
 
 // Follows light from a luminaire chosen by its power. Lamps that throw no shadow are left to strategies that meet or choose them.
 void trace_from_light(const RenderContext& context, const SubpathSettings& settings, Sampler& sampler, LightSubpath& path);
-
-// The radius of a pixel at `position`, if it is seen directly: what textures and bumps of both kinds of subpath are filtered by.
-float footprint_at(const Camera& camera, const Vec2& pixel, Vec3 position);
 
 // What the surface at `point`, seen from `w`, makes of light from point.wo: f |cos θ| for light that comes from there, and the density
 // with which it would be followed from w to there. `bsdf` is the surface's as seen from point.wo.
