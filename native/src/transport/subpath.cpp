@@ -21,6 +21,15 @@ Rgb delta_factor(const RenderContext& context, const ShadingPoint& point, const 
   return in > 0.0f ? e->value * (out / in) : Rgb();
 }
 
+// Of what a vertex scatters towards wi, the part by diffuse lobes.
+Rgb diffuse_share(const LightVertex& v, Vec3 wi) {
+  if (!(v.bsdf.flags() & kDiffuse)) return Rgb();
+  if (!(v.bsdf.flags() & kGlossy)) return Rgb(1.0f);
+  const uint8_t side = dot(v.point.ng, wi) >= 0.0f ? kReflection : kTransmission;
+  const Rgb all = v.bsdf.eval(v.point.wo, wi).value, diffuse = v.bsdf.eval(v.point.wo, wi, side | kDiffuse).value;
+  return {safe_divide(diffuse.r(), all.r()), safe_divide(diffuse.g(), all.g()), safe_divide(diffuse.b(), all.b())};
+}
+
 }  // namespace
 
 PathState unknown_state() {
@@ -99,7 +108,7 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     v.point.footprint = settings.footprint(v.point.position);
     context.scene.shade(v.point, v.bsdf);
     const float cos_in = abs_dot(v.point.ng, v.point.wo);
-    v.bounces = carried.bounces, v.seen_by = carried.seen_by, v.is_first = carried.is_first;
+    v.bounces = carried.bounces, v.seen_by = carried.seen_by, v.is_first = carried.is_first, v.by_mirrors = carried.by_mirrors;
     if (!(cos_in > 0.0f)) return;
     if (v.is_first) {
       const auto light = context.lights.arriving(*emitted, light_query(v.point, v.bsdf));
@@ -150,6 +159,8 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     if (u_continue >= alpha) return;
     carried.power = v.power * factor / alpha;
     carried.weights = v.weights.scattered(h, is_delta, cos_out, next->pdf_dir, pdf_reverse);
+    carried.by_mirrors = is_delta ? v.by_mirrors : v.by_mirrors * (Rgb(1.0f) - diffuse_share(v, next->wi));
+    if (settings.only_by_mirrors && is_black(carried.by_mirrors)) return;
     carried.is_first = false, carried.seen_by = visible;
     passed = Rgb(1.0f), travelled = 0;
     ray = {offset_point(v.point.position, v.point.ng, next->wi), next->wi};

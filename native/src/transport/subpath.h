@@ -53,6 +53,7 @@ struct LightVertex {
   BounceCount bounces;   // on the way here
   uint32_t seen_by = 0xffffffffu;  // RayKind bits: what of this surface sees where the light comes from
   bool is_first = true;            // lit by the luminaire itself
+  Rgb by_mirrors{1.0f};            // the share of its power that no diffuse lobe scattered on the way
 };
 
 struct LightSubpath {
@@ -77,6 +78,7 @@ struct SubpathSettings {
   BounceLimits limits;
   Heuristic heuristic{};
   PixelFootprint footprint{};
+  bool only_by_mirrors = false;  // ends at the first vertex all of whose light diffuse lobes scattered
 };
 
 // Follows light from a luminaire chosen by its power. Lamps that throw no shadow are left to strategies that meet or choose them.

@@ -1,0 +1,69 @@
+// Stochastic progressive photon mapping: every pass sends out photons of its own, and eye paths read them where they meet diffuse surfaces,
+// within a radius that shrinks from pass to pass [Hachisuka & Jensen 2009]; all pixels' alike, so that passes do not depend on each other
+// [Knaus & Zwicker 2011]. Noise and blur both vanish in the end.
+#include "integrators/integrator.h"
+#include "transport/diffuse_end.h"
+#include "transport/photon_map.h"
+
+namespace gi {
+namespace {
+
+class SppmIntegrator final : public Integrator {
+ public:
+  explicit SppmIntegrator(const Parameters& p) : photons_(p.integer("photons")), radius_(p.real("radius")), alpha_(p.number("alpha")) {
+    s_.limits = {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
+                 p.integer("transparent_bounces")};
+  }
+
+  void render_pass(const RenderContext& context, int pass, Film& film) override {
+    const FilmSpec& spec = film.spec();
+    SubpathSettings light;
+    light.limits = s_.limits, light.footprint = {context.camera, spec.width, spec.height};
+    const PhotonMap map(trace_photons(context, light, pass, photons_, kCausticPhoton | kGlobalPhoton), photons_, context.pool);
+    if (context.cancelled) return;
+    context.log.set("photons", double(map.size()));
+    context.log.set("radius, pixels", double(radius_) * std::sqrt(shrinking(pass)));
+    const float scale = radius_ * float(std::sqrt(shrinking(pass)));
+    for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) {
+      trace_to_diffuse(
+          context, film, s_, camera, sampler, result, [](const ShadingPoint&, const Bsdf&) { return Rgb(); },
+          [&](const ShadingPoint& point, const Bsdf& bsdf, bool) { return map.radiance(point, bsdf, scale * point.footprint); });
+    });
+  }
+
+ private:
+  // The squared radius of a pass over the first one's: ∏ (i + α) / (i + 1). [Knaus & Zwicker 2011, eq. 15]
+  double shrinking(int pass) const { return std::exp(std::lgamma(pass + 1 + alpha_) - std::lgamma(1 + alpha_) - std::lgamma(pass + 2.0)); }
+
+  int photons_;
+  float radius_;
+  double alpha_;
+  DiffuseEndSettings s_;
+};
+
+}  // namespace
+
+const Descriptor& sppm_descriptor() {
+  using Kind = Parameter::Kind;
+  static const Descriptor descriptor{
+      "sppm",
+      "Progressive Photon Mapping",
+      "Photons of every pass are read within a radius that shrinks: caustics, also those seen in mirrors and through glass. Blurred at "
+      "first, "
+      "right in the end",
+      {
+          {"photons", "Photons", Kind::kInt, 200000, 1, 1e9, "Sent out in each pass"},
+          {"radius", "Radius", Kind::kFloat, 6, 0.1, 1000, "Within which photons are read in the first pass, in pixels"},
+          {"alpha", "Alpha", Kind::kFloat, 0.6667, 0.05, 1,
+           "How much of a disc's photons the next pass keeps: less is sharper and noisier"},
+          {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
+          {"diffuse_bounces", "Diffuse", Kind::kInt, 4, 0, 1024, "Diffuse reflections"},
+          {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},
+          {"transmission_bounces", "Transmission", Kind::kInt, 12, 0, 1024, "Refractions"},
+          {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
+      },
+      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<SppmIntegrator>(p); }};
+  return descriptor;
+}
+
+}  // namespace gi

@@ -1,0 +1,132 @@
+// Paths from the eye that end at diffuse surfaces, where something else knows the light: they follow what is specular and glossy, and find
+// what comes straight from luminaires by themselves.
+#pragma once
+#include "transport/camera_path.h"
+
+namespace gi {
+
+struct DiffuseEndSettings {
+  BounceLimits limits;
+  uint8_t without = 0;          // CausticFlags: what a path does not see after a diffuse bounce
+  bool gathers = false;         // the first diffuse surface is not the end: from there a path looks for the light of others
+  bool direct_known = false;    // where it ends without gathering, direct light too
+  bool gathered_known = false;  // where it ends after gathering, direct light too; where it gathers, what mirrors, glass and glossy throw
+};
+
+// Direct light by chance: luminaires that a ray of the chosen lobes meets before anything else.
+inline Rgb meet_light(const RenderContext& context, const BounceLimits& limits, const ShadingPoint& point, const Bsdf& bsdf,
+                      PathState state, Vec2 u, float u_lobe) {
+  constexpr LightSampling kMode = LightSampling::kMis;
+  const auto next = bsdf.sample(point.wo, u, u_lobe);
+  if (!next || !(next->pdf_dir > 0.0f)) return Rgb();
+  const RayOrigin origin{light_query(point, bsdf), next->pdf_dir};
+  advance(state, next->flags, limits);
+  const uint32_t visibility = visibility_of(state.kind);
+  Ray ray{offset_point(point.position, point.ng, next->wi), next->wi};
+  Rgb throughput = next->value / next->pdf_dir, found;
+  do {
+    const auto hit = context.scene.intersect(ray, visibility);
+    found += throughput * lamps_along(context, ray, hit ? hit->t : kInf, origin, kMode, visibility);
+    if (!hit) return found + throughput * light_beyond(context, ray, origin, kMode, state);
+    ShadingPoint met = context.scene.shading_point(ray, *hit, state);
+    found += throughput * surface_emission(context, met, context.scene.emission(met), origin, kMode);
+    throughput *= context.scene.transparency(met);
+    ray.origin = offset_point(met.position, met.ng, ray.direction);
+  } while (!is_black(throughput) && advance(state, kTransparent, limits));
+  return found;
+}
+
+// Follows one path. `at_gather(point, bsdf)` and `at_end(point, bsdf, gathered)`: what is known of the radiance of the diffuse lobes there.
+template <class AtGather, class AtEnd>
+void trace_to_diffuse(const RenderContext& context, const Film& film, const DiffuseEndSettings& s, const CameraRay& camera,
+                      Sampler& sampler, PixelSample& result, const AtGather& at_gather, const AtEnd& at_end) {
+  constexpr LightSampling kMode = LightSampling::kMis;
+  constexpr uint8_t kOthers = kGlossy | kSpecular | kTransparent;
+  constexpr int kIndirectDepth = 1 << 20;
+  Bsdf bsdf;
+  CameraPath path(camera);
+  bool may_scatter = true;
+  bool gathered = false, known = false;  // `known`: what shines here has been counted where the path gathered
+  const int first_depth = context.lightmap ? context.lightmap->first_depth() : 0;
+  const auto add = [&](Rgb radiance, int depth) {
+    if (depth >= first_depth) result.radiance += path.throughput * radiance;
+  };
+
+  for (uint32_t bounce = 0;; ++bounce) {
+    sampler.jump_to(bounce + 1);
+    const uint32_t visibility = visibility_of(path.state.kind);
+    const auto hit = context.scene.intersect(path.ray, visibility);
+    const int depth = path.state.depth;
+    if (!known) add(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, kMode, visibility), depth);
+    if (!hit) {
+      if (!known) add(path.leave(context, film, kMode, result), depth);
+      break;
+    }
+    const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
+    const Rgb emitted = known ? Rgb() : surface_emission(context, point, bsdf.emission, path.origin, kMode);
+    if (depth == 0) result.emission += path.throughput * emitted;
+    add(emitted, depth);
+
+    const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
+    const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
+    const auto direct_light = [&] { return sample_direct_light(context, point, bsdf, kMode, u_light_choice, u_light); };
+    const bool is_diffuse = bsdf.flags() & kDiffuse, gathers = s.gathers && !gathered && is_diffuse;
+    if (gathers) {
+      // Either the diffuse lobes or the others: what is known is of the first.
+      const float diffuse = average(bsdf.albedo(point.wo, kDiffuse));
+      const float others = average(bsdf.albedo(point.wo, kGlossy | kSpecular) + bsdf.transparency);
+      const float p_diffuse = others > 0.0f ? std::clamp(diffuse / (diffuse + others), 0.1f, 0.9f) : 1.0f;
+      const bool follows_diffuse = p_diffuse == 1.0f || sampler.next_1d() < p_diffuse;
+      if (p_diffuse < 1.0f) {
+        bsdf.choose(follows_diffuse ? uint8_t(kDiffuse) : kOthers, point.wo);
+        path.throughput *= 1.0f / (follows_diffuse ? p_diffuse : 1.0f - p_diffuse);
+      }
+      if (may_scatter && follows_diffuse) add(at_gather(point, bsdf), kIndirectDepth);
+      if (may_scatter) add(direct_light(), depth + 1);
+    } else if (may_scatter) {
+      // The diffuse lobes end the path, the others go on.
+      if (is_diffuse) {
+        add(at_end(point, bsdf, gathered), kIndirectDepth);
+        bsdf.choose(kDiffuse, point.wo);
+        if (!(gathered ? s.gathered_known : s.direct_known)) {
+          add(direct_light(), depth + 1);
+          add(meet_light(context, s.limits, point, bsdf, path.state, u, u_lobe), depth + 1);
+        }
+        bsdf.choose(kOthers, point.wo);
+      }
+      if (!(gathered && s.gathered_known)) add(direct_light(), depth + 1);
+    }
+
+    const auto next = bsdf.sample(point.wo, u, u_lobe);
+    if (!next || !(next->pdf_dir > 0.0f)) break;
+    const bool transparent = next->flags & kTransparent;
+    if (!may_scatter && !transparent) break;
+    const Rgb weight = next->value / next->pdf_dir;
+    path.throughput *= weight;
+    if (is_black(path.throughput)) break;
+    path.travelled += hit->t;
+    if (transparent) {
+      if (!advance(path.state, next->flags, s.limits)) break;
+      path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, path.ray.t_max - hit->t};
+      path.origin.query.path = path.state;
+      continue;
+    }
+    may_scatter = advance(path.state, next->flags, s.limits);
+    const FilmSpec& spec = film.spec();
+    if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
+      path.seen_from_camera = false;
+    known = gathered && s.gathered_known;
+    if (gathers && (next->flags & kDiffuse)) gathered = true;
+    path.state.without = next->flags & kDiffuse ? s.without : 0;
+    path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : next->pdf_dir};
+    path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+
+    const float alpha = std::min(1.0f, max_component(weight));
+    if (alpha < 1.0f) {
+      if (sampler.next_1d() >= alpha) break;
+      path.throughput *= 1.0f / alpha;
+    }
+  }
+}
+
+}  // namespace gi

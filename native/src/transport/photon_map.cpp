@@ -1,0 +1,197 @@
+// Photons: sent out, stored, and looked up.
+#include "transport/photon_map.h"
+
+namespace gi {
+namespace {
+
+constexpr float kSlope = 0.8f;      // least cosine between the normals of one surface
+constexpr float kThickness = 0.3f;  // how far off the plane photons may lie, of the radius
+
+float sign_of(float x) { return x < 0.0f ? -1.0f : 1.0f; }
+
+// The limits of the eye, less what the light's part of the path has used up; nothing if that is more than there is.
+std::optional<Photon> within_limits(const LightVertex& v, const BounceLimits& limits, int most) {
+  BounceCount used = v.bounces;
+  if (!v.is_first) used.add(kReflection | kDiffuse);
+  const int left[4] = {std::min(limits.total, most) - used.total, limits.diffuse - used.diffuse, limits.glossy - used.glossy,
+                       limits.transmission - used.transmission};
+  Photon photon;
+  uint8_t* to[4] = {&photon.total, &photon.diffuse, &photon.glossy, &photon.transmission};
+  for (int k = 0; k < 4; ++k) {
+    if (left[k] < 0) return {};
+    *to[k] = uint8_t(std::min(left[k], 255));
+  }
+  return photon;
+}
+
+// The part of a vertex's power that is of the wished classes.
+Rgb power_of(const LightVertex& v, uint8_t classes) {
+  if (!(v.bsdf.flags() & kDiffuse) || !(v.seen_by & kRayDiffuse)) return Rgb();
+  if (v.is_first) return classes & kDirectPhoton ? v.power : Rgb();
+  Rgb share;
+  if (classes & kCausticPhoton) share += v.by_mirrors;
+  if (classes & kGlobalPhoton) share += Rgb(1.0f) - v.by_mirrors;
+  return v.power * share;
+}
+
+float cross2(Vec2 a, Vec2 b) { return a.x * b.y - a.y * b.x; }
+
+// Area of the convex hull; reorders the points. [Andrew 1979]
+float hull_area(std::vector<Vec2>& points) {
+  std::sort(points.begin(), points.end(), [](Vec2 a, Vec2 b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
+  float twice = 0;
+  for (const float side : {1.0f, -1.0f}) {
+    static thread_local std::vector<Vec2> chain;
+    chain.clear();
+    for (const Vec2 p : points) {
+      while (chain.size() > 1 && side * cross2(chain.back() - chain[chain.size() - 2], p - chain.back()) <= 0.0f) chain.pop_back();
+      chain.push_back(p);
+    }
+    for (size_t i = 1; i < chain.size(); ++i) twice += side * cross2(chain[i - 1], chain[i]);
+  }
+  return 0.5f * twice;
+}
+
+// The share of a disc that is surface, by the points found in it: at edges and corners there is less. [Jensen 2001, §7.2.3]
+float covered_share(std::vector<Vec2>& points, float radius_squared) {
+  constexpr size_t kLeast = 16;
+  constexpr float kWhole = 0.85f;  // scatter of the hull
+  if (points.size() < kLeast) return 1.0f;
+  const float missed = 3.383f * std::pow(float(points.size()), -2.0f / 3.0f);  // by the hull of points in a disc [Renyi & Sulanke 1963]
+  const float share = hull_area(points) / ((1.0f - missed) * kPi * radius_squared);
+  return share > kWhole ? 1.0f : std::max(share, 0.1f);
+}
+
+}  // namespace
+
+PackedDirection::PackedDirection(Vec3 w) {
+  const float scale = 1.0f / (std::abs(w.x) + std::abs(w.y) + std::abs(w.z));
+  float x = w.x * scale, y = w.y * scale;
+  if (w.z < 0.0f) {
+    const float folded = (1.0f - std::abs(y)) * sign_of(x);
+    y = (1.0f - std::abs(x)) * sign_of(y), x = folded;
+  }
+  u = int16_t(std::lrint(x * 32767.0f)), v = int16_t(std::lrint(y * 32767.0f));
+}
+
+Vec3 PackedDirection::unpack() const {
+  const float x = float(u) / 32767.0f, y = float(v) / 32767.0f, z = 1.0f - std::abs(x) - std::abs(y);
+  if (z >= 0.0f) return normalize({x, y, z});
+  return normalize({(1.0f - std::abs(y)) * sign_of(x), (1.0f - std::abs(x)) * sign_of(y), z});
+}
+
+std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes) {
+  constexpr int kBatch = 1024;
+  const int batches = (count + kBatch - 1) / kBatch;
+  std::vector<std::vector<Photon>> found{size_t(batches)};
+  context.pool.for_each(batches, context.cancelled, [&](int b) {
+    static thread_local LightSubpath path;
+    for (int k = b * kBatch; k < std::min((b + 1) * kBatch, count); ++k) {
+      Sampler sampler = light_sampler(context, pass, count, uint32_t(k));
+      trace_from_light(context, settings, sampler, path);
+      for (int i = 0; i < path.count; ++i) {
+        const LightVertex& v = path.vertices[size_t(i)];
+        const Rgb power = power_of(v, classes);
+        if (is_black(power)) continue;
+        auto photon = within_limits(v, settings.limits, path.max_bounces);
+        if (!photon) continue;
+        photon->position = v.point.position, photon->wi = PackedDirection(v.point.wo), photon->normal = PackedDirection(v.point.ng);
+        photon->power[0] = power.r(), photon->power[1] = power.g(), photon->power[2] = power.b();
+        found[size_t(b)].push_back(*photon);
+      }
+    }
+  });
+  size_t total = 0;
+  for (const auto& part : found) total += part.size();
+  std::vector<Photon> all;
+  all.reserve(total);
+  for (auto& part : found) all.insert(all.end(), part.begin(), part.end()), std::vector<Photon>().swap(part);
+  return all;
+}
+
+PhotonMap::PhotonMap(std::vector<Photon> photons, double paths, ThreadPool& pool) : scale_(float(1.0 / paths)) {
+  std::vector<Vec3> positions;
+  positions.reserve(photons.size());
+  for (const Photon& p : photons) positions.push_back(p.position);
+  tree_ = PointTree(positions, pool);
+  photons_.reserve(photons.size());
+  for (const uint32_t i : tree_.order()) photons_.push_back(photons[i]);
+}
+
+float PhotonMap::spread(Vec3 position, size_t count) const {
+  std::vector<PointTree::Found> found;
+  tree_.nearest(position, count, kInf, found);
+  float farthest = 0.0f;
+  for (const auto& f : found) farthest = std::max(farthest, f.distance_squared);
+  return std::sqrt(farthest);
+}
+
+bool PhotonMap::is_of(const Photon& photon, Vec3 position, Vec3 normal, float radius) const {
+  return abs_dot(photon.normal.unpack(), normal) > kSlope && abs_dot(photon.position - position, normal) < kThickness * radius;
+}
+
+// f Φ: irradiance is by the true normal, whatever normals the lobes weigh light by.
+Rgb PhotonMap::scattered(const ShadingPoint& point, const Bsdf& bsdf, const Photon& photon) const {
+  if (!photon.reaches(point.path)) return Rgb();
+  const Vec3 wi = photon.wi.unpack();
+  const float cosine = abs_dot(photon.normal.unpack(), wi);
+  const uint8_t side = dot(point.ng, wi) >= 0.0f ? kReflection : kTransmission;
+  if (!(cosine > 1e-4f)) return Rgb();
+  return Rgb(photon.power[0], photon.power[1], photon.power[2]) * bsdf.eval(point.wo, wi, side | kDiffuse).value / cosine;
+}
+
+Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius) const {
+  Rgb sum;
+  float radius_squared = sqr(radius);
+  tree_.within(point.position, radius_squared, [&](uint32_t k, float) {
+    const Photon& photon = photons_[k];
+    if (is_of(photon, point.position, point.ng, radius)) sum += scattered(point, bsdf, photon);
+  });
+  return sum * (scale_ / (kPi * sqr(radius)));
+}
+
+Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count) const {
+  static thread_local std::vector<PointTree::Found> found;
+  tree_.nearest(point.position, count, sqr(radius), found,
+                [&](uint32_t k) { return is_of(photons_[k], point.position, point.ng, radius); });
+  if (found.empty()) return Rgb();
+  // With fewer than `count`, the cone reaches as far as was looked.
+  float end = radius;
+  if (found.size() == count) {
+    end = 0.0f;
+    for (const auto& f : found) end = std::max(end, f.distance_squared);
+    end = std::sqrt(end);
+  }
+  Rgb sum;
+  for (const auto& f : found) sum += scattered(point, bsdf, photons_[f.point]) * (1.0f - std::sqrt(f.distance_squared) / end);
+  return sum * (3.0f * scale_ / (kPi * sqr(end)));
+}
+
+Rgb PhotonMap::irradiance(Vec3 position, Vec3 normal, float radius, size_t count) const {
+  static thread_local std::vector<PointTree::Found> found;
+  PathState eye;
+  eye.depth = eye.diffuse_depth = 1;
+  tree_.nearest(position, count, sqr(radius), found, [&](uint32_t k) {
+    const Photon& photon = photons_[k];
+    return photon.reaches(eye) && dot(photon.normal.unpack(), normal) > kSlope && is_of(photon, position, normal, radius);
+  });
+  if (found.empty()) return Rgb();
+  float end = 0.0f;
+  for (const auto& f : found) end = std::max(end, f.distance_squared);
+  if (found.size() < count) end = sqr(radius);
+  static thread_local std::vector<Vec2> places;
+  places.clear();
+  const Frame frame = Frame::from_normal(normal);
+  Rgb sum;
+  for (const auto& f : found) {
+    const Photon& photon = photons_[f.point];
+    sum += Rgb(photon.power[0], photon.power[1], photon.power[2]);
+    const Vec3 place = frame.to_local(photon.position - position);
+    places.push_back({place.x, place.y});
+  }
+  // The farthest one only marks the border.
+  const float counted = found.size() < count ? 1.0f : float(count - 1) / float(count);
+  return sum * (counted * scale_ / (kPi * end * covered_share(places, end)));
+}
+
+}  // namespace gi

@@ -1,0 +1,72 @@
+// Photons: the power that light left at diffuse surfaces, kept with where it came from, and the density estimates that turn it into
+// radiance. [Jensen 1996; Jensen 2001, "Realistic Image Synthesis Using Photon Mapping"]
+#pragma once
+#include <optional>
+
+#include "core/point_tree.h"
+#include "transport/light_path.h"
+#include "transport/subpath.h"
+
+namespace gi {
+
+// A unit vector in 32 bits, folded onto an octahedron; off by 3·10⁻⁵ at most. [Cigolle et al. 2014, "oct"]
+struct PackedDirection {
+  int16_t u = 0, v = 0;
+  PackedDirection() = default;
+  explicit PackedDirection(Vec3 w);
+  Vec3 unpack() const;
+};
+
+struct Photon {
+  Vec3 position;
+  float power[3] = {0, 0, 0};  // watts
+  PackedDirection wi;          // towards where it came from
+  PackedDirection normal;      // of the surface, on that side
+  // Bounces that a path from the eye to this surface may have on its way, by kind.
+  uint8_t total = 0, diffuse = 0, glossy = 0, transmission = 0;
+
+  bool reaches(const PathState& eye) const {
+    return eye.depth <= total && eye.diffuse_depth <= diffuse && eye.glossy_depth <= glossy && eye.transmission_depth <= transmission;
+  }
+};
+static_assert(sizeof(Photon) <= 48);
+
+enum PhotonClass : uint8_t {
+  kDirectPhoton = 1,   // straight from a luminaire: L D
+  kCausticPhoton = 2,  // by way of mirrors, glass and glossy surfaces alone: L S+ D
+  kGlobalPhoton = 4,   // by way of a diffuse surface
+};
+
+// Sends out the `count` light paths of a pass, and keeps what they leave of the wished classes (bits of PhotonClass). All light is that of
+// the photons over `count`. The order is that of the paths.
+std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes);
+
+// Photons that can be looked up. Those of other surfaces are refused: of another slope, or off the plane of the point.
+class PhotonMap {
+ public:
+  PhotonMap() = default;
+  PhotonMap(std::vector<Photon> photons, double paths, ThreadPool& pool);
+
+  size_t size() const { return photons_.size(); }
+  const std::vector<Photon>& photons() const { return photons_; }
+  size_t memory_bytes() const { return photons_.capacity() * sizeof(Photon) + tree_.memory_bytes(); }
+
+  // Radiance towards point.wo of the diffuse lobes, by all photons nearer than `radius`: Σ f Φ / π r². [Jensen 2001, eq. 7.6]
+  Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius) const;
+  // By the nearest `count` of those within `radius`, weighed by a cone that ends at the farthest. [Jensen 2001, eq. 7.8]
+  Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count) const;
+  // Power per area on the side of `normal`, by the nearest `count` within `radius`; of those that reach an eye one diffuse bounce away.
+  Rgb irradiance(Vec3 position, Vec3 normal, float radius, size_t count) const;
+  // The distance of the `count`-th photon.
+  float spread(Vec3 position, size_t count) const;
+
+ private:
+  bool is_of(const Photon& photon, Vec3 position, Vec3 normal, float radius) const;
+  Rgb scattered(const ShadingPoint& point, const Bsdf& bsdf, const Photon& photon) const;
+
+  std::vector<Photon> photons_;  // in the order of the tree
+  PointTree tree_;
+  float scale_ = 0;  // 1 / paths
+};
+
+}  // namespace gi
