@@ -39,6 +39,7 @@ PASSES = (
     Pass("Denoising Albedo", "Denoising Albedo", "RGB", "COLOR", ("gi_engine.use_pass_albedo", DENOISING)),
     Pass("Denoising Normal", "Denoising Normal", "XYZ", "VECTOR", (DENOISING,)),
     Pass("Debug Sample Count", "Debug Sample Count", "X", "VALUE", ("gi_engine.use_pass_sample_count", SAMPLE_COUNT)),
+    Pass("Cache Samples", "Cache Samples", "X", "VALUE", ("gi_engine.use_pass_cache_samples",)),
 )
 
 

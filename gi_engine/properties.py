@@ -139,6 +139,9 @@ class GI_PG_lightmap(bpy.types.PropertyGroup):
 class GI_PG_view_layer(bpy.types.PropertyGroup):
     use_pass_albedo: BoolProperty(name="Albedo", description="Share of light that the surface reflects or transmits")
     use_pass_sample_count: BoolProperty(name="Sample Count", description="Samples that each pixel got")
+    use_pass_cache_samples: BoolProperty(
+        name="Cache Samples", description="Irradiance caching: where the records lie that light is interpolated between"
+    )
 
 
 _registered: list[type] = []

@@ -214,6 +214,7 @@ class GI_VIEWLAYER_PT_passes(Panel, bpy.types.Panel):
         for name in ("use_pass_z", "use_pass_normal", "use_pass_position", "use_pass_uv"):
             column.prop(layer, name)
         column.prop(layer.gi_engine, "use_pass_sample_count")
+        column.prop(layer.gi_engine, "use_pass_cache_samples")
         column = columns(self.layout, heading="Indexes")
         for name in ("use_pass_object_index", "use_pass_material_index"):
             column.prop(layer, name)

@@ -23,4 +23,5 @@ NB_MODULE(_core, m) {
   gi::bind::bind_bsdf(m);
   gi::bind::bind_lights(m);
   gi::bind::bind_points(m);
+  gi::bind::bind_irradiance(m);
 }

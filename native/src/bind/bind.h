@@ -16,6 +16,7 @@ void bind_evaluate(nanobind::module_& m);
 void bind_bsdf(nanobind::module_& m);
 void bind_lights(nanobind::module_& m);
 void bind_points(nanobind::module_& m);
+void bind_irradiance(nanobind::module_& m);
 
 // The images of a scene_data.Scene.
 std::unique_ptr<ShaderResources> read_resources(nanobind::handle scene);

@@ -38,6 +38,7 @@ const PassRule kPassRules[] = {
     {"Denoising Normal", 3, Keep::kMean, [](const PixelSample& s, float, float* o) { add_vec(s.normal, o); }},
     {"Object Index", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { add_number(s.object_index, o); }},
     {"Material Index", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { add_number(s.material_index, o); }},
+    {"Cache Samples", 1, Keep::kMean, [](const PixelSample& s, float, float* o) { add_number(s.cache_record, o); }},
     {"Emission", 3, Keep::kLight, [](const PixelSample& s, float exposure, float* o) { add_rgb(s.emission * exposure, o); }},
     {"Environment", 3, Keep::kLight, [](const PixelSample& s, float exposure, float* o) { add_rgb(s.environment * exposure, o); }},
 };

@@ -37,6 +37,7 @@ struct PixelSample {
   Vec2 uv;
   bool has_uv = false;
   float object_index = 0, material_index = 0;
+  float cache_record = 0;  // 1 where a record of an irradiance cache lies
 };
 
 struct PassRule;  // what a pass holds and how it is averaged: film.cpp

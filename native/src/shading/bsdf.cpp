@@ -250,6 +250,13 @@ Rgb Bsdf::diffuse_albedo(Vec3 wo, uint8_t side) const {
   return sum;
 }
 
+Vec3 Bsdf::diffuse_normal() const {
+  Vec3 sum;
+  for (const Entry& e : *this)
+    if (e.flags & kDiffuse) sum += e.frame.z * average(e.weight);
+  return normalize_or(sum, ns_);
+}
+
 Vec3 Bsdf::mean_normal() const {
   Vec3 sum;
   for (const Entry& e : *this) sum += e.frame.z * e.select;

@@ -85,6 +85,7 @@ class Bsdf {
   Rgb albedo(Vec3 wo, uint8_t flags) const;  // only of lobes with a kind (kDiffuse, kGlossy, kSpecular) in `flags`
   Rgb diffuse_albedo() const;       // Σ weights of the diffuse lobes
   Rgb diffuse_albedo(Vec3 wo, uint8_t side) const;  // directional, of those that reflect or those that transmit
+  Vec3 diffuse_normal() const;      // weighted mean of the diffuse lobes'
   Vec3 mean_normal() const;         // albedo-weighted shading normal (Normal pass, denoising)
   uint8_t flags() const { return flags_; }
   bool is_delta() const { return (flags_ & (kDiffuse | kGlossy)) == 0; }  // nothing for light sampling to do

@@ -1,0 +1,33 @@
+// One record of an irradiance cache: a stratified hemisphere of rays, and from the same rays how irradiance changes as the point moves
+// and its normal turns. [Ward & Heckbert 1992] Leaves out what the rays bring home.
+#pragma once
+#include <functional>
+
+#include "transport/irradiance_cache.h"
+
+namespace gi {
+
+struct GatheredRay {
+  Rgb radiance;
+  float distance = kInf;  // to the first surface
+};
+
+// Strata of a hemisphere, equal in projected solid angle: rings about the normal, each of as many sectors, nearly square.
+struct HemisphereStrata {
+  int rings, sectors;
+  explicit HemisphereStrata(int samples)
+      : rings(std::max(2, int(std::sqrt(float(samples) * kInvPi) + 0.5f))), sectors(std::max(4, int(kPi * float(rings) + 0.5f))) {}
+  int count() const { return rings * sectors; }
+};
+
+// What rays see from a place: irradiance, its gradients, and the harmonic mean and least of the distances.
+struct GatheredIrradiance {
+  IrradianceRecord record;  // its radius is the harmonic mean
+  float nearest = kInf;
+};
+
+// `ray(index, direction)`: about `samples` of them, one for each stratum; `jitter(index)` places it therein.
+GatheredIrradiance gather_irradiance(Vec3 position, Vec3 normal, int samples, const std::function<Vec2(int)>& jitter,
+                                     const std::function<GatheredRay(int, Vec3)>& ray);
+
+}  // namespace gi

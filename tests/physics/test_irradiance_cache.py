@@ -1,0 +1,274 @@
+"""Irradiance caching: gradients against closed forms, the rules of the cache, and whole pictures against closed forms and path tracing.
+
+The cache is biased on purpose: tolerances below are the bias that its settings allow, and are stated as numbers."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+from agreement_scenes import SCENES, camera
+from light_scenes import f32, lamp, matrix, triangle_scene
+from test_closed_forms import cube, lambert, probe, quad, scene_of, sphere, surface
+
+from gi_engine import native
+from gi_engine import scene_data as sd
+from gi_engine.session import Session
+
+UP = f32((0, 0, 1))
+MANY = {f"{kind}_bounces": 60 for kind in ("max", "diffuse", "glossy", "transmission")}
+
+
+def irradiance_of(scene, error=0.2):
+    return native.module().TestIrradiance(scene, native.embree_path(), error)
+
+
+def triangles_of(*quads):
+    return [t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))]
+
+
+# -------------------------------------------------------------------------------------------------- records
+
+LAMP = ((-0.3, -0.4, 0.5), (0.5, -0.4, 0.6), (0.5, 0.4, 0.7), (-0.3, 0.4, 0.6))
+PLACES = [(0, 0, 0), (0.3, 0.1, 0), (-0.6, 0.2, 0), (0.1, -0.9, 0)]
+
+
+def truth(position, normal=(0, 0, 1)):
+    """Irradiance from LAMP of radiance 1."""
+    return math.pi * lambert(LAMP, np.asarray(position, float), np.asarray(normal, float))
+
+
+def slope(f, h=1e-4):
+    return np.array([(f(h * e) - f(-h * e)) / (2 * h) for e in np.eye(3)])
+
+
+def gathered(position, samples, count):
+    """Mean and standard error over `count` records."""
+    scene = triangle_scene(triangles_of(LAMP))
+    rows = irradiance_of(scene).gather(f32(*[position] * count), UP, samples)
+    return rows.mean(0), rows.std(0, ddof=1) / math.sqrt(count)
+
+
+@pytest.mark.parametrize("position", PLACES)
+def test_gradients_are_the_slopes_of_irradiance(position):
+    mean, error = gathered(position, 1024, 64)
+    expected = truth(position)
+    assert abs(mean[0] - expected) < 5 * error[0]
+    # Strata that the lamp's edge cuts are taken to lie within it as a whole: a few per cent.
+    moved = slope(lambda d: truth(np.asarray(position) + d))[:2]
+    np.testing.assert_allclose(mean[2:4], moved, atol=5 * error[2:4].max() + 0.05 * np.abs(moved).max())
+    # Turned by a small angle towards x and y.
+    turned = slope(lambda d: truth(position, d + (0, 0, 1)))[:2]
+    np.testing.assert_allclose(mean[5:7], turned, atol=5 * error[5:7].max() + 0.01 * expected)
+    assert abs(mean[4]) < 1e-5 * expected and abs(mean[7]) < 1e-5 * expected  # nothing along the normal
+
+
+# -------------------------------------------------------------------------------------------------- the cache
+
+
+def filled(places, radius, gradient=(0, 0, 0), error=0.2, normal=UP):
+    """A cache of records of 1 + gradient · position, in a scene of 4 m."""
+    cache = irradiance_of(triangle_scene([((-2, -2, -2), (2, 2, 2), (2, -2, 2))]), error)
+    places = f32(*places)
+    radii = np.full(len(places), radius, np.float32) if np.isscalar(radius) else np.array(radius, np.float32)
+    cache.insert_linear(places, np.ascontiguousarray(np.broadcast_to(normal, places.shape)), radii, f32(gradient))
+    return cache
+
+
+def test_gradients_make_interpolation_exact_where_light_is_linear():
+    rng = np.random.default_rng(1)
+    gradient = np.array((0.3, -0.2, 0.0))
+    cache = filled(np.column_stack([rng.uniform(-1, 1, (2000, 2)), np.zeros(2000)]), 0.5, gradient)
+    at = np.column_stack([rng.uniform(-0.9, 0.9, (500, 2)), np.zeros(500)]).astype(np.float32)
+    for freeze in (False, True):
+        if freeze:
+            cache.freeze()
+        found = cache.find(at, UP, UP)
+        assert (found[:, 3] == 1).all()
+        assert (found[:, 1] > 5).all()
+        np.testing.assert_allclose(found[:, 0], 1 + at @ gradient, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("position", "normal", "holds"),
+    [
+        ((0.10, 0, 0), (0, 0, 1), True),
+        ((0.19, 0, 0), (0, 0, 1), True),
+        ((0.21, 0, 0), (0, 0, 1), False),  # further than alpha times the radius
+        ((0.10, 0, 0), (0, 0, -1), False),  # the other side
+        ((0.10, 0, 0), (1, 0, 0), False),
+        ((0.00, 0, 0), (math.sin(0.25), 0, math.cos(0.25)), True),  # sqrt(1 - cos) = 0.18
+        ((0.00, 0, 0), (math.sin(0.3), 0, math.cos(0.3)), False),
+        ((0.05, 0, 0.08), (0, 0, 1), True),  # behind the record's surface, so to speak
+        ((0.05, 0, -0.08), (0, 0, 1), False),  # the record is in front of the point
+    ],
+)
+def test_where_a_record_holds(position, normal, holds):
+    cache = filled([(0, 0, 0)], 1.0)
+    assert cache.find(f32(position), f32(normal), f32(normal))[0, 3] == holds
+
+
+def test_weights_fade_to_nothing_where_a_record_ends():
+    """Crossing the end of a record's sphere is not seen: another record's value goes on without a step."""
+    cache = irradiance_of(triangle_scene([((-2, -2, -2), (2, 2, 2), (2, -2, 2))]), 0.2)
+    for x, g in ((0.0, 0.0), (0.3, 1.0)):  # of values 1 and 1.3, without gradients between them
+        cache.insert_linear(f32((x, 0, 0)), UP, np.array([1.0], np.float32), f32((g, 0, 0)))
+    at = np.column_stack([np.linspace(-0.2, 0.5, 2001), np.zeros((2001, 2))]).astype(np.float32)
+    values = cache.find(at, UP, UP)[:, 0]
+    assert values.min() < 1.01
+    assert values.max() > 1.29
+    assert np.abs(np.diff(values)).max() < 5e-3
+
+
+def test_neighbours_clamp_one_another():
+    """After any insertions no radius exceeds another's by more than the distance between the two. [Křivánek 2006]"""
+    rng = np.random.default_rng(3)
+    places = np.column_stack([rng.uniform(-1, 1, (300, 2)), np.zeros(300)])
+    radii = filled(places, rng.uniform(0.05, 2.0, 300)).radii()[:, 0]
+    distance = np.linalg.norm(places[:, None] - places[None], axis=-1)
+    near = distance < 0.2 * radii[:, None]
+    excess = np.where(near, radii[:, None] - radii[None, :] - distance, -1)
+    assert excess.max() < 1e-5
+    assert radii.max() > 0.1
+
+
+def test_lookups_are_fast():
+    """Under a microsecond at 20,000 records, on an idle machine; twice that is let pass."""
+    rng = np.random.default_rng(4)
+    side = 4.0 / math.sqrt(20_000)
+    places = np.column_stack([rng.uniform(-2, 2, (20_000, 2)), np.zeros(20_000)])
+    cache = filled(places, 1.0 * side / 0.2)
+    cache.freeze()
+    x, y = np.meshgrid(np.linspace(-1.9, 1.9, 300), np.linspace(-1.9, 1.9, 300))
+    at = np.stack([x, y, np.zeros_like(x)], -1).reshape(-1, 3).astype(np.float32)
+    assert (cache.find(at, UP, UP)[:, 1] > 0).mean() > 0.95
+    seconds = min(cache.time(at, UP) for _ in range(5)) / len(at)
+    assert seconds < 2e-6, f"{seconds * 1e9:.0f} ns"
+
+
+# -------------------------------------------------------------------------------------------------- pictures
+
+
+def render(
+    scene, seed=1, pixels=32, samples=16, integrator="irradiance_cache", threads=2, passes=("Combined",), **parameters
+):
+    scene.film = sd.Film(pixels, pixels, passes=list(passes))
+    settings = sd.Settings(integrator, samples, seed=seed, threads=threads, parameters=parameters)
+    with Session(scene, settings) as session:
+        while not session.wait():
+            pass
+        assert session.progress()["bad_samples"] == 0
+        return [session.read(name).astype(np.float64) for name in passes], session.native.figures()
+
+
+def near(found, expected, bias):
+    error = found.std(ddof=1) / math.sqrt(found.size)
+    assert abs(found.mean() - expected) < 4.5 * error + bias * expected, f"{found.mean():.5f} instead of {expected:.5f}"
+
+
+@pytest.mark.parametrize("albedo", [0.5, 0.8])
+@pytest.mark.parametrize("cached_bounces", [1, 4])
+def test_closed_furnace(albedo, cached_bounces):
+    scene = scene_of((cube(), surface(albedo, 1.0)))
+    found = probe(
+        scene,
+        (0.1, 0.2, -0.1),
+        (0.3, 0.5, 0.8),
+        integrator="irradiance_cache",
+        cached_bounces=cached_bounces,
+        record_samples=4096,
+        **MANY,
+    )
+    near(found, 1 / (1 - albedo), 0.02)
+
+
+@pytest.mark.parametrize("bounces", [0, 1, 2, 3, 7])
+def test_integrating_sphere(bounces):
+    """n bounces leave 1 - 2^-(n+1), those in the cache and those that are traced alike."""
+    bulb = lamp("POINT", (4 * math.pi * math.pi,) * 3, matrix=matrix((0, 0, 0)))
+    scene = scene_of((sphere(), surface(0.5)), lights=[bulb])
+    limits = {"max_bounces": bounces, "diffuse_bounces": bounces}
+    found = probe(scene, (0.2, 0.1, 0.0), (0.5, 0.3, 0.7), integrator="irradiance_cache", **limits)
+    near(found, 1 - 0.5 ** (bounces + 1), 0.005)
+
+
+def test_bowl_under_the_sky():
+    scene = scene_of((sphere(top=math.pi / 2), surface(0.8)), world=1.0)
+    for towards in ((0, 0, -1), (0.9, 0, -0.3)):
+        found = probe(scene, (0, 0, -0.2), towards, integrator="irradiance_cache", **MANY)
+        near(found, 0.8 * 0.5 / (1 - 0.8 * 0.5), 0.02)
+
+
+AGREEING = ["area lamp", "point lamp", "smooth normals", "gloss", "principled", "bumpy", "translucent", "transparent shadows", "emissive mesh", "sky"]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", AGREEING)
+def test_pictures_agree_with_path_tracing(name):
+    """Blocks of the picture within 2 % of it (bumps 4 %), the picture within 1 % (2 %)."""
+    seeds, blocks = 3, 4
+    found = {}
+    for integrator, samples in (("path", 128), ("irradiance_cache", 32)):
+        images = []
+        for seed in range(seeds):
+            scene = SCENES[name]()
+            scene.camera = camera()
+            (image,), _ = render(scene, seed + 1, samples=samples, integrator=integrator)
+            images.append(image[..., :3].reshape(blocks, 8, blocks, 8, 3).mean((1, 3)))
+        found[integrator] = np.array(images)
+    path, cache = found["path"], found["irradiance_cache"]
+    error = np.sqrt((path.var(0, ddof=1) + cache.var(0, ddof=1)) / seeds)
+    allowed = 2.0 if name == "bumpy" else 1.0
+    difference = np.abs(path.mean(0) - cache.mean(0))
+    assert abs(path.mean() - cache.mean()) < allowed * 0.01 * path.mean() + 3 * np.sqrt((error**2).sum()) / error.size
+    assert (difference < allowed * 0.02 * path.mean() + 6 * error).all(), (difference / path.mean()).max()
+
+
+def test_no_light_comes_through_a_thin_wall():
+    """A wall without thickness on a floor, a lamp on its one side: the dark side stays dark up to the wall's foot."""
+    room = cube(2.0)
+    wall = quad((0, -2, -2), (0, 2, -2), (0, 2, 2), (0, -2, 2))
+    bulb = lamp("POINT", (100.0,) * 3, matrix=matrix((1, 0, 0)), radius=0.1)
+    scene = scene_of((room, surface(0.8)), (wall, surface(0.8)), lights=[bulb])
+    scene.camera = sd.Camera("camera", "ORTHO", matrix((0, 0, 1.9)), (-1, 1, -1, 1), 0.0, 100.0)
+    (image,), _ = render(scene, pixels=64)
+    left, right = image[:, :31, :3], image[:, 33:, :3]
+    assert right.min() > 0.5
+    assert left.max() < 5e-3 * right.mean()
+
+
+def test_cache_samples_show_where_records_lie():
+    scene = SCENES["area lamp"]()
+    scene.camera = camera()
+    (_, records), figures = render(scene, pixels=64, passes=("Combined", "Cache Samples"))
+    assert figures["cache hit rate"] > 0.98
+    assert 50 < figures["cache records of the first bounce"] <= figures["cache records"]
+    assert 0.2 * figures["cache records of the first bounce"] < (records > 0).sum() < 0.4 * records.size
+
+
+def test_a_smaller_error_makes_more_records_and_a_truer_picture():
+    def result(**parameters):
+        scene = SCENES["smooth normals"]()
+        scene.camera = camera()
+        (image,), figures = render(scene, samples=64, **parameters)
+        return image[..., :3], figures["cache records of the first bounce"]
+
+    reference = np.mean([result(error=0.1, record_samples=2048, min_spacing=1)[0]], 0)
+    coarse, few = result(error=0.8, record_samples=2048)
+    fine, many = result(error=0.2, record_samples=2048)
+    assert many > 1.5 * few
+    assert ((fine - reference) ** 2).mean() < ((coarse - reference) ** 2).mean()
+
+
+def test_cancel_ends_the_overture():
+    scene = SCENES["area lamp"]()
+    scene.camera = camera()
+    scene.film = sd.Film(256, 256)
+    settings = sd.Settings("irradiance_cache", 4, parameters={"record_samples": 16384, "error": 0.05})
+    with Session(scene, settings) as session:
+        time.sleep(0.3)
+        assert session.progress()["passes"] == 0
+        start = time.perf_counter()
+        session.native.cancel()
+        while not session.wait():
+            pass
+        assert time.perf_counter() - start < 0.5
