@@ -2,7 +2,8 @@
 // sampling, follow what is specular, read caustics from their own map at diffuse surfaces, and gather all other light from the surfaces
 // that they see there, where it is known from the photons.
 #include "transport/photon_map.h"
-#include "core/check.h"
+#include <chrono>
+
 #include "integrators/integrator.h"
 #include "transport/diffuse_end.h"
 
@@ -17,9 +18,8 @@ class IrradianceMap {
     constexpr size_t kEvery = 4;
     std::vector<Vec3> positions;
     for (size_t k = 0; k < map.size(); k += kEvery) {
-      const Photon& photon = map.photons()[k];
-      records_.push_back({photon.normal.unpack(), Rgb()});
-      positions.push_back(photon.position);
+      records_.push_back({map.normal(k), Rgb()});
+      positions.push_back(map.position(k));
     }
     constexpr size_t kBatch = 256;
     context.pool.for_each(int((records_.size() + kBatch - 1) / kBatch), context.cancelled, [&](int b) {
@@ -60,7 +60,7 @@ class IrradianceMap {
 float typical_spread(const PhotonMap& map, size_t count) {
   const size_t probes = std::min<size_t>(256, map.size());
   std::vector<float> found;
-  for (size_t i = 0; i < probes; ++i) found.push_back(map.spread(map.photons()[i * map.size() / probes].position, count));
+  for (size_t i = 0; i < probes; ++i) found.push_back(map.spread(map.position(i * map.size() / probes), count));
   if (found.empty()) return 0.0f;
   const auto most = found.begin() + ptrdiff_t(found.size() * 3 / 4);
   std::nth_element(found.begin(), most, found.end());
@@ -98,6 +98,7 @@ class PhotonMapIntegrator final : public Integrator {
 
  private:
   void build(const RenderContext& context, const FilmSpec& spec) {
+    const auto start = std::chrono::steady_clock::now();
     SubpathSettings light;
     light.limits = s_.limits, light.footprint = {context.camera, spec.width, spec.height};
     const uint8_t all = s_.gathers ? kDirectPhoton | kCausticPhoton | kGlobalPhoton : uint8_t(kGlobalPhoton);
@@ -108,8 +109,11 @@ class PhotonMapIntegrator final : public Integrator {
     reach_ = typical_spread(global_, global_count_);
     if (s_.gathers) irradiance_ = IrradianceMap(global_, global_count_, reach_, context);
     built_ = !context.cancelled;
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     context.log.set("global photons", double(global_.size()));
     context.log.set("caustic photons", double(caustic_.size()));
+    context.log.set("photon seconds", took.count());
+    context.log.set("photon bytes", double(global_.memory_bytes() + caustic_.memory_bytes()));
     context.log.say(std::to_string(global_.size()) + " global and " + std::to_string(caustic_.size()) + " caustic photons, " +
                     std::to_string((global_.memory_bytes() + caustic_.memory_bytes() + irradiance_.memory_bytes()) >> 20) + " MiB");
   }

@@ -114,8 +114,8 @@ PhotonMap::PhotonMap(std::vector<Photon> photons, double paths, ThreadPool& pool
   positions.reserve(photons.size());
   for (const Photon& p : photons) positions.push_back(p.position);
   tree_ = PointTree(positions, pool);
-  photons_.reserve(photons.size());
-  for (const uint32_t i : tree_.order()) photons_.push_back(photons[i]);
+  lights_.reserve(photons.size());
+  for (const uint32_t i : tree_.order()) lights_.push_back(photons[i]);
 }
 
 float PhotonMap::spread(Vec3 position, size_t count) const {
@@ -126,12 +126,12 @@ float PhotonMap::spread(Vec3 position, size_t count) const {
   return std::sqrt(farthest);
 }
 
-bool PhotonMap::is_of(const Photon& photon, Vec3 position, Vec3 normal, float radius) const {
-  return abs_dot(photon.normal.unpack(), normal) > kSlope && abs_dot(photon.position - position, normal) < kThickness * radius;
+bool PhotonMap::is_of(uint32_t k, Vec3 position, Vec3 normal, float radius) const {
+  return abs_dot(tree_.point(k) - position, normal) < kThickness * radius && abs_dot(lights_[k].normal.unpack(), normal) > kSlope;
 }
 
 // f Φ: irradiance is by the true normal, whatever normals the lobes weigh light by.
-Rgb PhotonMap::scattered(const ShadingPoint& point, const Bsdf& bsdf, const Photon& photon) const {
+Rgb PhotonMap::scattered(const ShadingPoint& point, const Bsdf& bsdf, const PhotonLight& photon) const {
   if (!photon.reaches(point.path)) return Rgb();
   const Vec3 wi = photon.wi.unpack();
   const float cosine = abs_dot(photon.normal.unpack(), wi);
@@ -144,16 +144,14 @@ Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radiu
   Rgb sum;
   float radius_squared = sqr(radius);
   tree_.within(point.position, radius_squared, [&](uint32_t k, float) {
-    const Photon& photon = photons_[k];
-    if (is_of(photon, point.position, point.ng, radius)) sum += scattered(point, bsdf, photon);
+    if (is_of(k, point.position, point.ng, radius)) sum += scattered(point, bsdf, lights_[k]);
   });
   return sum * (scale_ / (kPi * sqr(radius)));
 }
 
 Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count) const {
   static thread_local std::vector<PointTree::Found> found;
-  tree_.nearest(point.position, count, sqr(radius), found,
-                [&](uint32_t k) { return is_of(photons_[k], point.position, point.ng, radius); });
+  tree_.nearest(point.position, count, sqr(radius), found, [&](uint32_t k) { return is_of(k, point.position, point.ng, radius); });
   if (found.empty()) return Rgb();
   // With fewer than `count`, the cone reaches as far as was looked.
   float end = radius;
@@ -163,7 +161,7 @@ Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radiu
     end = std::sqrt(end);
   }
   Rgb sum;
-  for (const auto& f : found) sum += scattered(point, bsdf, photons_[f.point]) * (1.0f - std::sqrt(f.distance_squared) / end);
+  for (const auto& f : found) sum += scattered(point, bsdf, lights_[f.point]) * (1.0f - std::sqrt(f.distance_squared) / end);
   return sum * (3.0f * scale_ / (kPi * sqr(end)));
 }
 
@@ -172,8 +170,8 @@ Rgb PhotonMap::irradiance(Vec3 position, Vec3 normal, float radius, size_t count
   PathState eye;
   eye.depth = eye.diffuse_depth = 1;
   tree_.nearest(position, count, sqr(radius), found, [&](uint32_t k) {
-    const Photon& photon = photons_[k];
-    return photon.reaches(eye) && dot(photon.normal.unpack(), normal) > kSlope && is_of(photon, position, normal, radius);
+    const PhotonLight& photon = lights_[k];
+    return photon.reaches(eye) && dot(photon.normal.unpack(), normal) > 0.0f && is_of(k, position, normal, radius);
   });
   if (found.empty()) return Rgb();
   float end = 0.0f;
@@ -184,9 +182,9 @@ Rgb PhotonMap::irradiance(Vec3 position, Vec3 normal, float radius, size_t count
   const Frame frame = Frame::from_normal(normal);
   Rgb sum;
   for (const auto& f : found) {
-    const Photon& photon = photons_[f.point];
-    sum += Rgb(photon.power[0], photon.power[1], photon.power[2]);
-    const Vec3 place = frame.to_local(photon.position - position);
+    const float* power = lights_[f.point].power;
+    sum += Rgb(power[0], power[1], power[2]);
+    const Vec3 place = frame.to_local(tree_.point(f.point) - position);
     places.push_back({place.x, place.y});
   }
   // The farthest one only marks the border.

@@ -17,8 +17,7 @@ struct PackedDirection {
   Vec3 unpack() const;
 };
 
-struct Photon {
-  Vec3 position;
+struct PhotonLight {
   float power[3] = {0, 0, 0};  // watts
   PackedDirection wi;          // towards where it came from
   PackedDirection normal;      // of the surface, on that side
@@ -29,7 +28,9 @@ struct Photon {
     return eye.depth <= total && eye.diffuse_depth <= diffuse && eye.glossy_depth <= glossy && eye.transmission_depth <= transmission;
   }
 };
-static_assert(sizeof(Photon) <= 48);
+struct Photon : PhotonLight {
+  Vec3 position;
+};
 
 enum PhotonClass : uint8_t {
   kDirectPhoton = 1,   // straight from a luminaire: L D
@@ -47,9 +48,10 @@ class PhotonMap {
   PhotonMap() = default;
   PhotonMap(std::vector<Photon> photons, double paths, ThreadPool& pool);
 
-  size_t size() const { return photons_.size(); }
-  const std::vector<Photon>& photons() const { return photons_; }
-  size_t memory_bytes() const { return photons_.capacity() * sizeof(Photon) + tree_.memory_bytes(); }
+  size_t size() const { return lights_.size(); }
+  Vec3 position(size_t k) const { return tree_.point(uint32_t(k)); }
+  Vec3 normal(size_t k) const { return lights_[k].normal.unpack(); }
+  size_t memory_bytes() const { return lights_.capacity() * sizeof(PhotonLight) + tree_.memory_bytes(); }
 
   // Radiance towards point.wo of the diffuse lobes, by all photons nearer than `radius`: Σ f Φ / π r². [Jensen 2001, eq. 7.6]
   Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius) const;
@@ -61,10 +63,10 @@ class PhotonMap {
   float spread(Vec3 position, size_t count) const;
 
  private:
-  bool is_of(const Photon& photon, Vec3 position, Vec3 normal, float radius) const;
-  Rgb scattered(const ShadingPoint& point, const Bsdf& bsdf, const Photon& photon) const;
+  bool is_of(uint32_t k, Vec3 position, Vec3 normal, float radius) const;
+  Rgb scattered(const ShadingPoint& point, const Bsdf& bsdf, const PhotonLight& photon) const;
 
-  std::vector<Photon> photons_;  // in the order of the tree
+  std::vector<PhotonLight> lights_;  // in the order of the tree
   PointTree tree_;
   float scale_ = 0;  // 1 / paths
 };

@@ -1,0 +1,82 @@
+"""What photons cost: sending them out and storing them, finding them, keeping them.
+
+    python bench/photons.py [--threads N]
+
+Writes bench/results/photons.md. Sending is measured in a Cornell box with a glass and a mirror ball (examples/jensen_box.blend)."""
+
+import argparse
+import os
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+import gi_engine
+from gi_engine import native
+from gi_engine.engine import export
+from gi_engine.session import Session
+
+ROOT = Path(__file__).resolve().parent.parent
+RESULT = ROOT / "bench" / "results" / "photons.md"
+ROUNDS = 3
+
+
+def jensen_box():
+    gi_engine.register()
+    bpy.ops.wm.open_mainfile(filepath=str(ROOT / "examples" / "jensen_box.blend"), load_ui=False)
+    scene = bpy.context.scene
+    scene.render.engine = "GI_ENGINE"
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return export(depsgraph, native.integrators(), None, (8, 8))
+
+
+def sent(exported, threads: int, count: int) -> dict:
+    """Figures of a map of `count` light paths' global photons, the median run."""
+    settings = exported.settings
+    settings.integrator, settings.samples, settings.threads = "photon_map", 1, threads
+    settings.parameters = {"global_photons": count, "caustic_photons": 1, "gather": False}
+    runs = []
+    for _ in range(ROUNDS):
+        with Session(exported.scene, settings) as session:
+            while not session.wait():
+                pass
+            runs.append(session.native.figures())
+    return sorted(runs, key=lambda f: f["photon seconds"])[ROUNDS // 2]
+
+
+def found(count: int, neighbours: int) -> tuple[float, float]:
+    """Seconds of building a tree of points on planes, microseconds of a query."""
+    rng = np.random.default_rng(1)
+    points = rng.random((count, 3)).astype(np.float32)
+    points[np.arange(count), rng.integers(0, 3, count)] = 0
+    start = time.perf_counter()
+    tree = native.module().TestPoints(points, 1)
+    built = time.perf_counter() - start
+    places = points[np.lexsort(np.floor(points * 64).astype(int).T)][:: count // 50_000]
+    start = time.perf_counter()
+    tree.nearest(places, neighbours)
+    return built, (time.perf_counter() - start) / len(places) * 1e6
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--threads", type=int, default=1)
+    options = parser.parse_args()
+    figures = sent(jensen_box(), options.threads, 1_000_000)
+    photons = figures["global photons"]
+    built, query = sorted(found(1_000_000, 50) for _ in range(ROUNDS))[ROUNDS // 2]
+    lines = [
+        "# Photons\n",
+        f"- {photons:,.0f} photons of 1,000,000 light paths sent, stored and made a tree of, {options.threads} thread: "
+        f"{figures['photon seconds']:.2f} s; {1e6 * figures['photon seconds'] / photons:.2f} s for a million",
+        f"- memory: {figures['photon bytes'] / photons:.1f} bytes a photon, its part of the tree included",
+        f"- a tree of 1,000,000 points: {built:.2f} s; the nearest 50: {query:.1f} us",
+    ]
+    RESULT.write_text("\n".join(lines) + "\n")
+    print(*lines, sep="\n", flush=True)
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
