@@ -1,15 +1,13 @@
 // Particle tracing: light is carried from the luminaires by particles that are absorbed or go on at every surface and leave their power
 // in its texels [Pattanaik & Mudur 1992]; the eye then reads the texels' irradiance at the first diffuse surface of its paths.
 #include "integrators/integrator.h"
-#include "transport/camera_path.h"
+#include "transport/diffuse_end.h"
 #include "transport/texels.h"
 
 namespace gi {
 namespace {
 
 constexpr uint32_t kParticleStream = 0x70617274u;
-constexpr LightSampling kMode = LightSampling::kMis;
-constexpr int kIndirectDepth = 1 << 20;
 constexpr uint8_t kAllLobes = kDiffuse | kGlossy | kSpecular | kTransparent;
 constexpr uint32_t kMostLayers = 64;  // that light without shadows passes
 constexpr int kBatch = 1024;  // particles that a thread takes at a time
@@ -94,7 +92,6 @@ class ParticleIntegrator final : public Integrator {
   void carry(const RenderContext& context, const EmittedRay& emitted, Particle p, Ledger& ledger);
   void look(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler, PixelSample& result) const;
   Rgb read(const ShadingPoint& point, const Bsdf& bsdf) const;
-  Rgb meet_light(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, PathState state, Vec2 u, float u_lobe) const;
 
   // A bake of indirect light alone must be able to tell it apart.
   bool direct_in_texels(const RenderContext& context) const {
@@ -231,101 +228,14 @@ Rgb ParticleIntegrator::read(const ShadingPoint& point, const Bsdf& bsdf) const 
   return radiance;
 }
 
-// Direct light by chance: luminaires that a ray of the chosen lobes meets before anything else.
-Rgb ParticleIntegrator::meet_light(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, PathState state, Vec2 u,
-                                   float u_lobe) const {
-  const auto next = bsdf.sample(point.wo, u, u_lobe);
-  if (!next || !(next->pdf_dir > 0.0f)) return Rgb();
-  const RayOrigin origin{light_query(point, bsdf), next->pdf_dir};
-  advance(state, next->flags, s_.limits);
-  const uint32_t visibility = visibility_of(state.kind);
-  Ray ray{offset_point(point.position, point.ng, next->wi), next->wi};
-  Rgb throughput = next->value / next->pdf_dir, found;
-  do {
-    const auto hit = context.scene.intersect(ray, visibility);
-    found += throughput * lamps_along(context, ray, hit ? hit->t : kInf, origin, kMode, visibility);
-    if (!hit) return found + throughput * light_beyond(context, ray, origin, kMode, state);
-    ShadingPoint met = context.scene.shading_point(ray, *hit, state);
-    found += throughput * surface_emission(context, met, context.scene.emission(met), origin, kMode);
-    throughput *= context.scene.transparency(met);
-    ray.origin = offset_point(met.position, met.ng, ray.direction);
-  } while (!is_black(throughput) && advance(state, kTransparent, s_.limits));
-  return found;
-}
-
 void ParticleIntegrator::look(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler,
                               PixelSample& result) const {
-  Bsdf bsdf;
-  CameraPath path(camera);
-  bool may_scatter = true, may_gather = s_.gather;
-  const int first_depth = context.lightmap ? context.lightmap->first_depth() : 0;
-  const auto add = [&](Rgb radiance, int depth) {
-    if (depth >= first_depth) result.radiance += path.throughput * radiance;
-  };
-
-  for (uint32_t bounce = 0;; ++bounce) {
-    sampler.jump_to(bounce + 1);
-    const uint32_t visibility = visibility_of(path.state.kind);
-    const auto hit = context.scene.intersect(path.ray, visibility);
-    const int depth = path.state.depth;
-    add(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, kMode, visibility), depth);
-    if (!hit) {
-      add(path.leave(context, film, kMode, result), depth);
-      break;
-    }
-    const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
-    const Rgb emitted = surface_emission(context, point, bsdf.emission, path.origin, kMode);
-    if (depth == 0) result.emission += path.throughput * emitted;
-    add(emitted, depth);
-
-    const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
-    const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
-    const auto direct_light = [&](LightSampling mode) { return sample_direct_light(context, point, bsdf, mode, u_light_choice, u_light); };
-    const bool gathers = may_gather && (bsdf.flags() & kDiffuse);
-    if (may_scatter) {
-      // Diffuse lobes end the path: their light is in the texels, what comes straight from luminaires perhaps not.
-      if ((bsdf.flags() & kDiffuse) && !gathers) {
-        add(read(point, bsdf), kIndirectDepth);
-        bsdf.choose(kDiffuse, point.wo);
-        if (!direct_in_texels(context)) {
-          add(direct_light(kMode), depth + 1);
-          add(meet_light(context, point, bsdf, path.state, u, u_lobe), depth + 1);
-        }
-        bsdf.choose(kAllLobes & ~kDiffuse, point.wo);
-      }
-      add(direct_light(kMode), depth + 1);
-    }
-
-    // The others go on.
-    const auto next = bsdf.sample(point.wo, u, u_lobe);
-    if (!next || !(next->pdf_dir > 0.0f)) break;
-    const bool transparent = next->flags & kTransparent;
-    if (!may_scatter && !transparent) break;
-    const Rgb weight = next->value / next->pdf_dir;
-    path.throughput *= weight;
-    if (is_black(path.throughput)) break;
-    path.travelled += hit->t;
-    if (transparent) {
-      if (!advance(path.state, next->flags, s_.limits)) break;
-      path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, path.ray.t_max - hit->t};
-      path.origin.query.path = path.state;
-      continue;
-    }
-    may_scatter = advance(path.state, next->flags, s_.limits);
-    const FilmSpec& spec = film.spec();
-    if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
-      path.seen_from_camera = false;
-    if (next->flags & kDiffuse) may_gather = false;
-    path.state.without = next->flags & kDiffuse ? no_caustics() : 0;
-    path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : next->pdf_dir};
-    path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
-
-    const float alpha = std::min(1.0f, max_component(weight));
-    if (alpha < 1.0f) {
-      if (sampler.next_1d() >= alpha) break;
-      path.throughput *= 1.0f / alpha;
-    }
-  }
+  DiffuseEndSettings end;
+  end.limits = s_.limits, end.without = no_caustics(), end.gathers = s_.gather;
+  end.direct_known = end.direct_gathered = direct_in_texels(context);
+  trace_to_diffuse(
+      context, film, end, camera, sampler, result, [](const ShadingPoint&, const Bsdf&) { return Rgb(); },
+      [&](const ShadingPoint& point, const Bsdf& bsdf, bool) { return read(point, bsdf); });
 }
 
 }  // namespace

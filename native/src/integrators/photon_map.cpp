@@ -77,7 +77,7 @@ class PhotonMapIntegrator final : public Integrator {
         radius_(p.real("radius")) {
     s_.limits = {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
                  p.integer("transparent_bounces")};
-    s_.gathers = s_.gathered_known = p.on("gather");
+    s_.gathers = s_.direct_gathered = s_.caustics_known = p.on("gather");
   }
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {

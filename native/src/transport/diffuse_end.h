@@ -9,8 +9,9 @@ struct DiffuseEndSettings {
   BounceLimits limits;
   uint8_t without = 0;          // CausticFlags: what a path does not see after a diffuse bounce
   bool gathers = false;         // the first diffuse surface is not the end: from there a path looks for the light of others
-  bool direct_known = false;    // where it ends without gathering, direct light too
-  bool gathered_known = false;  // where it ends after gathering, direct light too; where it gathers, what mirrors, glass and glossy throw
+  bool direct_known = false;    // what is known where a path ends includes direct light: of one that has not gathered,
+  bool direct_gathered = false;  // of one that has
+  bool caustics_known = false;  // where a path gathers, the light that mirrors, glass and glossy surfaces throw is known
 };
 
 // Direct light by chance: luminaires that a ray of the chosen lobes meets before anything else.
@@ -88,13 +89,13 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
       if (is_diffuse) {
         add(at_end(point, bsdf, gathered), kIndirectDepth);
         bsdf.choose(kDiffuse, point.wo);
-        if (!(gathered ? s.gathered_known : s.direct_known)) {
+        if (!(gathered ? s.direct_gathered : s.direct_known)) {
           add(direct_light(), depth + 1);
           add(meet_light(context, s.limits, point, bsdf, path.state, u, u_lobe), depth + 1);
         }
         bsdf.choose(kOthers, point.wo);
       }
-      if (!(gathered && s.gathered_known)) add(direct_light(), depth + 1);
+      if (!(gathered && s.caustics_known)) add(direct_light(), depth + 1);
     }
 
     const auto next = bsdf.sample(point.wo, u, u_lobe);
@@ -115,7 +116,7 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
     const FilmSpec& spec = film.spec();
     if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
       path.seen_from_camera = false;
-    known = gathered && s.gathered_known;
+    known = gathered && s.caustics_known;
     if (gathers && (next->flags & kDiffuse)) gathered = true;
     path.state.without = next->flags & kDiffuse ? s.without : 0;
     path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : next->pdf_dir};
