@@ -157,7 +157,7 @@ class GIEngine(bpy.types.RenderEngine):
             self.update_stats("", status(progress, left, self.exported.settings.samples))
         control.report(
             control.Progress(
-                stage="Render",
+                stage=progress.get("stage") or "Render",
                 fraction=progress["fraction"],
                 passes=progress["passes"],
                 rays=progress["rays"],
@@ -224,7 +224,7 @@ def status(progress: dict, left: float | None, samples: int) -> str:
     rate = progress["rays"] / progress["seconds"] * 1e-6 if progress["seconds"] > 0 else 0
     parts = [
         f"Mem:{progress['memory'] / 2**20:.0f}M",
-        f"Sample {progress['samples_per_pixel']:.0f}/{samples}",
+        progress.get("stage") or f"Sample {progress['samples_per_pixel']:.0f}/{samples}",
         f"{rate:.1f} Mrays/s",
     ]
     if left is not None:

@@ -267,6 +267,7 @@ def test_cancel_ends_the_overture():
     with Session(scene, settings) as session:
         time.sleep(0.3)
         assert session.progress()["passes"] == 0
+        assert session.progress()["stage"].startswith("irradiance cache, bounce ")
         start = time.perf_counter()
         session.native.cancel()
         while not session.wait():

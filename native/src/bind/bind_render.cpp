@@ -61,6 +61,7 @@ nb::dict progress_dict(const Session& session) {
   }
   nb::dict d;
   d["passes"] = p.passes;
+  d["stage"] = session.log().stage();
   d["samples_per_pixel"] = p.passes;
   d["fraction"] = p.fraction;
   d["seconds"] = p.seconds;

@@ -16,7 +16,6 @@ constexpr int kSeedStep = 4;                      // the same for deeper levels
 constexpr size_t kLeastWave = 64;                 // records
 constexpr size_t kWaveShare = 8;                  // a wave is at most this part of what is there
 constexpr float kLeastReach = 1.0f;  // pixels
-constexpr float kRayEpsilon = 1e-6f;
 constexpr uint32_t kSeekSalt = 0x1c5eedu, kGatherSalt = 0x1c6a74u;  // streams of their own
 
 struct CacheSettings {
@@ -85,7 +84,7 @@ class IrradianceCacheIntegrator final : public Integrator {
   void play_overture(const RenderContext& context, Film& film);
   void fill_level(const RenderContext& context, const Film& film, int level);
   void seek(const RenderContext& context, const Film& film, int x, int y, int level, std::vector<Place>& places) const;
-  void fill(const RenderContext& context, const Film& film, std::vector<Place> places, IrradianceCache& cache);
+  void fill(const RenderContext& context, const Film& film, std::vector<Place> places, int level);
   IrradianceRecord gather(const RenderContext& context, const Film& film, const Place& place, uint32_t serial) const;
 
   // Diffuse bounces that a path may still make, and how many of all it has made: its level.
@@ -226,6 +225,9 @@ void IrradianceCacheIntegrator::play_overture(const RenderContext& context, Film
   }
   size_t records = 0, bytes = 0;
   for (const IrradianceCache& cache : caches_) records += cache.records().size(), bytes += cache.memory_bytes();
+  context.log.stage("");
+  context.log.say(std::to_string(records) + " records in the irradiance cache, " + std::to_string(caches_[0].records().size()) +
+                  " of the first bounce, " + std::to_string(bytes >> 20) + " MiB");
   context.log.set("cache records", double(records));
   context.log.set("cache records of the first bounce", double(caches_[0].records().size()));
   context.log.set("cache records worked out", double(gathered_));
@@ -255,7 +257,7 @@ void IrradianceCacheIntegrator::fill_level(const RenderContext& context, const F
     });
     std::vector<Place> places;
     for (const auto& batch : found) places.insert(places.end(), batch.begin(), batch.end());
-    fill(context, film, std::move(places), caches_[size_t(level)]);
+    fill(context, film, std::move(places), level);
   }
 }
 
@@ -296,7 +298,8 @@ void IrradianceCacheIntegrator::seek(const RenderContext& context, const Film& f
 }
 
 // Wave by wave: look up together, work out together, insert one after the other.
-void IrradianceCacheIntegrator::fill(const RenderContext& context, const Film& film, std::vector<Place> places, IrradianceCache& cache) {
+void IrradianceCacheIntegrator::fill(const RenderContext& context, const Film& film, std::vector<Place> places, int level) {
+  IrradianceCache& cache = caches_[size_t(level)];
   constexpr int kBatch = 1024;
   while (!context.cancelled) {
     std::vector<uint8_t> covered(places.size(), 0);
@@ -310,6 +313,7 @@ void IrradianceCacheIntegrator::fill(const RenderContext& context, const Film& f
     places = std::move(left);
     if (places.empty()) return;
 
+    context.log.stage("irradiance cache, bounce " + std::to_string(level + 1) + ", " + std::to_string(cache.records().size()) + " records");
     const size_t count = std::min(places.size(), std::max(kLeastWave, cache.records().size() / kWaveShare));
     std::vector<IrradianceRecord> made(count);
     context.pool.for_each(int(count), context.cancelled,
@@ -350,7 +354,7 @@ IrradianceRecord IrradianceCacheIntegrator::gather(const RenderContext& context,
   float radius = r.radius;
   const float slope = std::sqrt(sqr(luminance(r.translation[0])) + sqr(luminance(r.translation[1])) + sqr(luminance(r.translation[2])));
   if (slope > 0.0f) radius = std::min(radius, luminance(r.irradiance) / slope);
-  const float least = std::max({s_.min_spacing * pixel, s_.min_length, kRayEpsilon}) / error;
+  const float least = std::max({s_.min_spacing * pixel, s_.min_length, 1e-6f}) / error;
   const float most = std::min(s_.max_spacing * pixel, s_.max_length > 0.0f ? s_.max_length : kInf) / error;
   r.least = least;
   r.radius = std::max(least, std::min(radius, most));
@@ -371,7 +375,7 @@ const Descriptor& irradiance_cache_descriptor() {
       "rough diffuse surfaces are read as if light came to them evenly",
       {
           {"error", "Error", Kind::kFloat, 0.25, 0.01, 1, "Allowed between records: the smaller, the more of them"},
-          {"record_samples", "Samples", Kind::kInt, 512, 16, 1 << 20, "Rays over the hemisphere of each record"},
+          {"record_samples", "Samples", Kind::kInt, 1024, 16, 1 << 20, "Rays over the hemisphere of each record"},
           {"cached_bounces", "Cached Bounces", Kind::kInt, 4, 1, kMostLevels,
            "Diffuse bounces that have records; further ones are path traced"},
           {"min_spacing", "Minimum Spacing", Kind::kFloat, 3, 0, 1e4, "Pixels for which a record holds at least"},

@@ -83,6 +83,9 @@ std::optional<float> IrradianceCache::error_of(const Hot& hot, float radius, Vec
   return std::sqrt(distance2) / radius + safe_sqrt(1.0f - cosine);
 }
 
+// [Ward & Heckbert 1992, eq. 4], less a constant so that a record's weight ends at 0 where it does not hold any more.
+float IrradianceCache::weight_of(float error) const { return 1.0f / std::max(error, kEven * error_) - 1.0f / (kOverlap * error_); }
+
 bool IrradianceCache::covers(Vec3 position, Vec3 normal) const {
   bool covered = false;
   for_each_at(position, [&](const Hot& hot) {
@@ -104,16 +107,12 @@ std::optional<CachedIrradiance> IrradianceCache::find(Vec3 position, Vec3 normal
     const auto error = error_of(hot, hot.radius, position, normal, most);
     if (!error || (*error >= most && good.weight > 0.0f)) return;
     const IrradianceRecord& r = records_[hot.record];
-    const Vec3 d = position - r.position;
-    const Rgb moved = r.translation[0] * d.x + r.translation[1] * d.y + r.translation[2] * d.z;
-    const Rgb rotated = r.lateral[0] * bumped.x + r.lateral[1] * bumped.y + r.lateral[2] * bumped.z;
-    // [Ward & Heckbert 1992, eq. 4], less 1/α so that a record's weight ends at 0 where it does not hold any more.
     const bool is_good = *error < most;
-    const float weight = is_good ? 1.0f / std::max(*error, kEven * error_) - 1.0f / most : 1.0f / sqr(*error);
+    const float weight = is_good ? weight_of(*error) : 1.0f / sqr(*error);
     Sum& sum = is_good ? good : bent;
-    sum.irradiance += positive(r.irradiance * turned + moved + rotated) * weight;
+    sum.irradiance += r.at(position, bumped, turned) * weight;
     sum.weight += weight;
-    found.nearest = std::min(found.nearest, length(d));
+    found.nearest = std::min(found.nearest, length(position - r.position));
     ++found.records;
   });
   const Sum& sum = good.weight > 0.0f ? good : bent;

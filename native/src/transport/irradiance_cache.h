@@ -16,6 +16,13 @@ struct IrradianceRecord {
   Rgb irradiance;       // W/m²
   Rgb translation[3];   // ∂E/∂x, ∂E/∂y, ∂E/∂z for moves in the tangent plane
   Rgb lateral[3];       // the part of vector irradiance in the tangent plane: how E changes as the normal turns
+
+  // What it says of another place, and of the normal `bumped`; `turned` is the cosine between that and the surface's own there.
+  Rgb at(Vec3 place, Vec3 bumped, float turned) const {
+    const Vec3 d = place - position;
+    const Rgb moved = translation[0] * d.x + translation[1] * d.y + translation[2] * d.z;
+    return positive(irradiance * turned + moved + lateral[0] * bumped.x + lateral[1] * bumped.y + lateral[2] * bumped.z);
+  }
 };
 
 struct CachedIrradiance {
@@ -66,6 +73,7 @@ class IrradianceCache {
   Hot hot_of(uint32_t record) const;
   static std::optional<float> error_of(const Hot& hot, float radius, Vec3 position, Vec3 normal, float most);
   void refer(uint32_t node, Vec3 low, float side, uint32_t record, float reach);
+  float weight_of(float error) const;
   template <class F>
   void for_each_at(Vec3 position, const F& f) const;
   template <class F>

@@ -26,6 +26,15 @@ class Log {
       if (name == figure) return void(old = value);
     figures_.emplace_back(figure, value);
   }
+  // What is being done while no pass is under way yet; empty: nothing of the kind.
+  void stage(std::string text) {
+    const std::lock_guard lock(mutex_);
+    stage_ = std::move(text);
+  }
+  std::string stage() const {
+    const std::lock_guard lock(mutex_);
+    return stage_;
+  }
   std::vector<std::string> texts() const {
     const std::lock_guard lock(mutex_);
     return texts_;
@@ -38,6 +47,7 @@ class Log {
  private:
   mutable std::mutex mutex_;
   std::vector<std::string> texts_;
+  std::string stage_;
   std::vector<std::pair<std::string, double>> figures_;
 };
 
