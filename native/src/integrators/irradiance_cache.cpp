@@ -375,7 +375,7 @@ const Descriptor& irradiance_cache_descriptor() {
       "rough diffuse surfaces are read as if light came to them evenly",
       {
           {"error", "Error", Kind::kFloat, 0.25, 0.01, 1, "Allowed between records: the smaller, the more of them"},
-          {"record_samples", "Samples", Kind::kInt, 1024, 16, 1 << 20, "Rays over the hemisphere of each record"},
+          {"record_samples", "Samples", Kind::kInt, 512, 16, 1 << 20, "Rays over the hemisphere of each record"},
           {"cached_bounces", "Cached Bounces", Kind::kInt, 4, 1, kMostLevels,
            "Diffuse bounces that have records; further ones are path traced"},
           {"min_spacing", "Minimum Spacing", Kind::kFloat, 3, 0, 1e4, "Pixels for which a record holds at least"},
