@@ -70,20 +70,30 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
 
     const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
     const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
-    const auto direct_light = [&] { return sample_direct_light(context, point, bsdf, kMode, u_light_choice, u_light); };
+    // Of the lobes chosen, of which the next ray is drawn with probability `p`.
+    const auto direct_light = [&](float p = 1.0f) {
+      return sample_direct_light(context, point, bsdf, kMode, u_light_choice, u_light,
+                                 [p](Vec3, const LobeEval& e) { return p * e.pdf_dir; });
+    };
+    float p_lobes = 1.0f;  // of the choice between diffuse lobes and others
     const bool is_diffuse = bsdf.flags() & kDiffuse, gathers = s.gathers && !gathered && is_diffuse;
     if (gathers) {
-      // Either the diffuse lobes or the others: what is known is of the first.
+      // From here either the diffuse lobes are followed, which then gather, or the others.
+      if (may_scatter) add(at_gather(point, bsdf), kIndirectDepth);
       const float diffuse = average(bsdf.albedo(point.wo, kDiffuse));
       const float others = average(bsdf.albedo(point.wo, kGlossy | kSpecular) + bsdf.transparency);
       const float p_diffuse = others > 0.0f ? std::clamp(diffuse / (diffuse + others), 0.1f, 0.9f) : 1.0f;
-      const bool follows_diffuse = p_diffuse == 1.0f || sampler.next_1d() < p_diffuse;
-      if (p_diffuse < 1.0f) {
-        bsdf.choose(follows_diffuse ? uint8_t(kDiffuse) : kOthers, point.wo);
-        path.throughput *= 1.0f / (follows_diffuse ? p_diffuse : 1.0f - p_diffuse);
+      if (p_diffuse == 1.0f) {
+        if (may_scatter) add(direct_light(), depth + 1);
+      } else {
+        const bool follows_diffuse = sampler.next_1d() < p_diffuse;
+        for (const bool last : {false, true}) {
+          const bool is_for_diffuse = follows_diffuse == last;
+          p_lobes = is_for_diffuse ? p_diffuse : 1.0f - p_diffuse;
+          bsdf.choose(is_for_diffuse ? uint8_t(kDiffuse) : kOthers, point.wo);
+          if (may_scatter) add(direct_light(p_lobes), depth + 1);
+        }
       }
-      if (may_scatter && follows_diffuse) add(at_gather(point, bsdf), kIndirectDepth);
-      if (may_scatter) add(direct_light(), depth + 1);
     } else if (may_scatter) {
       // The diffuse lobes end the path, the others go on.
       if (is_diffuse) {
@@ -102,7 +112,7 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
     if (!next || !(next->pdf_dir > 0.0f)) break;
     const bool transparent = next->flags & kTransparent;
     if (!may_scatter && !transparent) break;
-    const Rgb weight = next->value / next->pdf_dir;
+    const Rgb weight = next->value / (p_lobes * next->pdf_dir);
     path.throughput *= weight;
     if (is_black(path.throughput)) break;
     path.travelled += hit->t;
@@ -119,7 +129,7 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
     known = gathered && s.caustics_known;
     if (gathers && (next->flags & kDiffuse)) gathered = true;
     path.state.without = next->flags & kDiffuse ? s.without : 0;
-    path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : next->pdf_dir};
+    path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : p_lobes * next->pdf_dir};
     path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
 
     const float alpha = std::min(1.0f, max_component(weight));
