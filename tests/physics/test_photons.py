@@ -84,7 +84,7 @@ def test_integrating_sphere(way):
         (sphere(rings=32), surface(0.5)), lights=[lamp("POINT", (4 * math.pi**2,) * 3, matrix=matrix((0, 0, 0)))]
     )
     mean, error = repeated(way, scene, (0.2, 0.1, 0), (0.5, 0.3, 0.7), width=0.05)
-    assert error < 0.02
+    assert error < 0.025
     assert abs(mean - 1) < 4 * error + 0.01  # 32 rings have half a percent less surface
 
 

@@ -81,7 +81,7 @@ class PhotonMapIntegrator final : public Integrator {
   }
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
-    if (!built_) build(context, film.spec());
+    if (!built_) build(context, film);
     if (context.cancelled) return;
     for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) {
       trace_to_diffuse(
@@ -97,13 +97,19 @@ class PhotonMapIntegrator final : public Integrator {
   }
 
  private:
-  void build(const RenderContext& context, const FilmSpec& spec) {
+  void build(const RenderContext& context, const Film& film) {
+    const FilmSpec& spec = film.spec();
     const auto start = std::chrono::steady_clock::now();
     SubpathSettings light;
     light.limits = s_.limits, light.footprint = {context.camera, spec.width, spec.height};
     const uint8_t all = s_.gathers ? kDirectPhoton | kCausticPhoton | kGlobalPhoton : uint8_t(kGlobalPhoton);
+    const EmissionGuide to_all = learn_emission(context, light, global_photons_, all, find_seen(context, film, s_.limits, s_.gathers));
+    light.guide = &to_all;
     global_ = PhotonMap(trace_photons(context, light, 0, global_photons_, all), global_photons_, context.pool);
     light.only_by_mirrors = true;
+    const EmissionGuide to_casters =
+        learn_emission(context, light, caustic_photons_, kCausticPhoton, find_seen(context, film, s_.limits, false));
+    light.guide = &to_casters;
     caustic_ = PhotonMap(trace_photons(context, light, 0, caustic_photons_, kCausticPhoton), caustic_photons_, context.pool);
     if (context.cancelled) return;
     reach_ = typical_spread(global_, global_count_);

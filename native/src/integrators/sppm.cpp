@@ -19,6 +19,11 @@ class SppmIntegrator final : public Integrator {
     const FilmSpec& spec = film.spec();
     SubpathSettings light;
     light.limits = s_.limits, light.footprint = {context.camera, spec.width, spec.height};
+    if (guide_is_old_) {
+      guide_ = learn_emission(context, light, photons_, kCausticPhoton | kGlobalPhoton, find_seen(context, film, s_.limits, false));
+      guide_is_old_ = context.cancelled;
+    }
+    light.guide = &guide_;
     const PhotonMap map(trace_photons(context, light, pass, photons_, kCausticPhoton | kGlobalPhoton), photons_, context.pool);
     if (context.cancelled) return;
     context.log.set("photons", double(map.size()));
@@ -39,6 +44,8 @@ class SppmIntegrator final : public Integrator {
   float radius_;
   double alpha_;
   DiffuseEndSettings s_;
+  EmissionGuide guide_;
+  bool guide_is_old_ = true;
 };
 
 }  // namespace

@@ -1,6 +1,8 @@
 // Photons: sent out, stored, and looked up.
 #include "transport/photon_map.h"
 
+#include "transport/diffuse_end.h"
+
 namespace gi {
 namespace {
 
@@ -80,33 +82,99 @@ Vec3 PackedDirection::unpack() const {
   return normalize({(1.0f - std::abs(y)) * sign_of(x), (1.0f - std::abs(x)) * sign_of(y), z});
 }
 
-std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes) {
+namespace {
+
+// Calls f(path, k) for the light paths of a pass, in batches of threads: f(batch) makes what the paths of a batch are given to.
+template <class Batch, class F>
+std::vector<Batch> for_each_path(const RenderContext& context, const SubpathSettings& settings, int pass, int count, const F& f) {
   constexpr int kBatch = 1024;
-  const int batches = (count + kBatch - 1) / kBatch;
-  std::vector<std::vector<Photon>> found{size_t(batches)};
-  context.pool.for_each(batches, context.cancelled, [&](int b) {
+  std::vector<Batch> found(size_t((count + kBatch - 1) / kBatch));
+  context.pool.for_each(int(found.size()), context.cancelled, [&](int b) {
     static thread_local LightSubpath path;
     for (int k = b * kBatch; k < std::min((b + 1) * kBatch, count); ++k) {
       Sampler sampler = light_sampler(context, pass, count, uint32_t(k));
       trace_from_light(context, settings, sampler, path);
-      for (int i = 0; i < path.count; ++i) {
-        const LightVertex& v = path.vertices[size_t(i)];
-        const Rgb power = power_of(v, classes);
-        if (is_black(power)) continue;
-        auto photon = within_limits(v, settings.limits, path.max_bounces);
-        if (!photon) continue;
-        photon->position = v.point.position, photon->wi = PackedDirection(v.point.wo), photon->normal = PackedDirection(v.point.ng);
-        photon->power[0] = power.r(), photon->power[1] = power.g(), photon->power[2] = power.b();
-        found[size_t(b)].push_back(*photon);
-      }
+      f(path, found[size_t(b)]);
     }
   });
+  return found;
+}
+
+}  // namespace
+
+std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes) {
+  auto found =
+      for_each_path<std::vector<Photon>>(context, settings, pass, count, [&](const LightSubpath& path, std::vector<Photon>& photons) {
+        for (int i = 0; i < path.count; ++i) {
+          const LightVertex& v = path.vertices[size_t(i)];
+          const Rgb power = power_of(v, classes);
+          if (is_black(power)) continue;
+          auto photon = within_limits(v, settings.limits, path.max_bounces);
+          if (!photon) continue;
+          photon->position = v.point.position, photon->wi = PackedDirection(v.point.wo), photon->normal = PackedDirection(v.point.ng);
+          photon->power[0] = power.r(), photon->power[1] = power.g(), photon->power[2] = power.b();
+          photons.push_back(*photon);
+        }
+      });
   size_t total = 0;
   for (const auto& part : found) total += part.size();
   std::vector<Photon> all;
   all.reserve(total);
   for (auto& part : found) all.insert(all.end(), part.begin(), part.end()), std::vector<Photon>().swap(part);
   return all;
+}
+
+SeenPoints find_seen(const RenderContext& context, const Film& film, const BounceLimits& limits, bool gathers) {
+  constexpr int kAcross = 48;
+  constexpr uint32_t kStream = 0x7365656eu;
+  DiffuseEndSettings end;
+  end.limits = limits, end.gathers = gathers, end.direct_known = end.direct_gathered = end.caustics_known = true;
+  const FilmSpec& spec = film.spec();
+  const Vec2 pixel{1.0f / float(spec.width), 1.0f / float(spec.height)};
+  std::vector<std::vector<Vec3>> rows(kAcross);
+  context.pool.for_each(kAcross, context.cancelled, [&](int y) {
+    for (int x = 0; x < kAcross; ++x) {
+      Sampler sampler(hash_combine(context.seed, kStream), uint32_t(y), uint32_t(x));
+      const Vec2 place = sampler.next_2d(), lens = sampler.next_2d();
+      const CameraRay ray =
+          context.camera.sample({(float(spec.x0) + (float(x) + place.x) / kAcross * float(spec.region_width())) * pixel.x,
+                                 (float(spec.y0) + (float(y) + place.y) / kAcross * float(spec.region_height())) * pixel.y},
+                                pixel, lens);
+      PixelSample nothing;
+      const auto note = [&](const ShadingPoint& point, const Bsdf&, bool) { return rows[size_t(y)].push_back(point.position), Rgb(); };
+      trace_to_diffuse(context, film, end, ray, sampler, nothing, [](const ShadingPoint&, const Bsdf&) { return Rgb(); }, note);
+    }
+  });
+  std::vector<Vec3> all;
+  for (const auto& row : rows) all.insert(all.end(), row.begin(), row.end());
+  return SeenPoints(all, context.pool);
+}
+
+EmissionGuide learn_emission(const RenderContext& context, SubpathSettings settings, int photons, uint8_t classes, const SeenPoints& seen) {
+  constexpr int kRounds = 3;
+  EmissionGuide guide(int(context.lights.count()));
+  const int count = std::clamp(photons / 8, 1000, 40000);
+  for (int round = 0; round < kRounds && !context.cancelled; ++round) {
+    settings.guide = &guide;
+    // Numbered apart from the paths that count: what is learnt from a path must not decide on the same path.
+    const int pass = -1 - round;
+    const auto found =
+        for_each_path<std::vector<EmissionGuide::Trial>>(context, settings, pass, count, [&](const LightSubpath& path, auto& trials) {
+          float worth = 0.0f;
+          for (int i = 0; i < path.count; ++i) {
+            const LightVertex& v = path.vertices[size_t(i)];
+            const Rgb power = power_of(v, classes);
+            if (!is_black(power) && seen.near(v.point.position)) worth += average(power);
+          }
+          if (worth > 0.0f) trials.push_back({path.start, worth});
+        });
+    EmissionGuide next = guide;
+    std::vector<EmissionGuide::Trial> trials;
+    for (const auto& part : found) trials.insert(trials.end(), part.begin(), part.end());
+    next.learn(trials);
+    guide = next;
+  }
+  return guide;
 }
 
 PhotonMap::PhotonMap(std::vector<Photon> photons, double paths, ThreadPool& pool) : scale_(float(1.0 / paths)) {

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/point_tree.h"
+#include "film/film.h"
 #include "transport/light_path.h"
 #include "transport/subpath.h"
 
@@ -41,6 +42,12 @@ enum PhotonClass : uint8_t {
 // Sends out the `count` light paths of a pass, and keeps what they leave of the wished classes (bits of PhotonClass). All light is that of
 // the photons over `count`. The order is that of the paths.
 std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes);
+
+// Points on diffuse surfaces that eye paths end at, after gathering or without.
+SeenPoints find_seen(const RenderContext& context, const Film& film, const BounceLimits& limits, bool gathers);
+
+// Learns to send photons of `classes` to what is seen.
+EmissionGuide learn_emission(const RenderContext& context, SubpathSettings settings, int photons, uint8_t classes, const SeenPoints& seen);
 
 // Photons that can be looked up. Those of other surfaces are refused: of another slope, or off the plane of the point.
 class PhotonMap {

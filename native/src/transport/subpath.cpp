@@ -83,7 +83,9 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
   path.count = 0;
   const float u_choice = sampler.next_1d();
   const Vec2 u_place = sampler.next_2d(), u_direction = sampler.next_2d();
-  const auto emitted = context.lights.emit(u_choice, u_place, u_direction);
+  EmissionNumbers& u = path.start = {u_choice, u_place.x, u_place.y, u_direction.x, u_direction.y};
+  const float weight = settings.guide ? settings.guide->warp(u) : 1.0f;
+  const auto emitted = context.lights.emit(u[0], {u[1], u[2]}, {u[3], u[4]});
   if (!emitted || !emitted->cast_shadow) return;
   const LampData* lamp = context.lights.lamp(emitted->light);
   path.max_bounces = lamp ? lamp->max_bounces : context.lights.is_world(emitted->light) ? context.scene.data().world.max_bounces : 1024;
@@ -118,7 +120,7 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
       // area at this vertex, which serves lights near and far alike]
       v.weights.vcm = h(light->pdf_dir / (pdf_emit * cos_in));
       v.weights.vc = light->is_delta || !light->use_mis ? 0.0f : h(1.0f / (pdf_emit * cos_in));
-      v.power = light->radiance * passed / pdf_emit;
+      v.power = light->radiance * passed * (weight / pdf_emit);
       v.seen_by = light->visibility;
     } else {
       v.weights = carried.weights.arrived(h, travelled + hit->t, cos_in);

@@ -4,6 +4,7 @@
 #include "core/sampler.h"
 #include "scene/camera_lens.h"
 #include "transport/direct_light.h"
+#include "transport/emission_guide.h"
 
 namespace gi {
 
@@ -60,6 +61,7 @@ struct LightSubpath {
   std::vector<LightVertex> vertices;  // of which `count` are in use: they are large, and kept
   int count = 0;
   int max_bounces = 1024;  // of the luminaire
+  EmissionNumbers start{}; // what it began with
 };
 
 // The radius of a pixel on a surface that is seen directly: what textures and bumps of both kinds of subpath are filtered by.
@@ -78,6 +80,7 @@ struct SubpathSettings {
   BounceLimits limits;
   Heuristic heuristic{};
   PixelFootprint footprint{};
+  const EmissionGuide* guide = nullptr;  // which strategies that weigh densities against others' know nothing of
   bool only_by_mirrors = false;  // ends at the first vertex all of whose light diffuse lobes scattered
 };
 
