@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from light_scenes import emission, lamp, matrix
 
-from gi_engine import native
 from gi_engine import scene_data as sd
 from gi_engine.nodes.program import ProgramBuilder
 from gi_engine.session import Session
@@ -322,21 +321,7 @@ def test_multiple_importance_beats_the_wrong_single_way(roughness, size, bad_way
         assert abs(found[way].mean() - found["MIS"].mean()) < Z * error
 
 
-# -------------------------------------------------------------------------------------------------- determinism
-
-
-@pytest.mark.parametrize("integrator", [descriptor["id"] for descriptor in native.integrators()])
-def test_any_number_of_threads_makes_the_same_image(integrator):
-    floor = quad((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0))
-    bulb = lamp("POINT", (50.0,) * 3, matrix=matrix((0, 0, 1.5)), radius=0.2)
-    scene = scene_of((floor, surface(0.5)), (sphere(0.5, 16), shiny(0.3)), (cube(3.0), surface(0.7)), lights=[bulb])
-    images = [
-        probe(scene, (0, 0, 2), (0, 0.1, -1), samples=4, pixels=65, width=3.0, integrator=integrator, threads=n)
-        for n in (1, 2, 3)
-    ]
-    assert images[0].std() > 0
-    assert np.array_equal(images[0], images[1])
-    assert np.array_equal(images[0], images[2])
+# -------------------------------------------------------------------------------------------------- bad samples
 
 
 def test_samples_that_are_not_numbers_are_left_out():
