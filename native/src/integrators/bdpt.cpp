@@ -2,6 +2,7 @@
 // other, all ways to make the same path weighed against one another [Lafortune & Willems 1993; Veach 1997, ch. 10].
 #include "integrators/integrator.h"
 #include "transport/camera_path.h"
+#include "transport/light_choice.h"
 #include "transport/light_path.h"
 #include "transport/subpath.h"
 
@@ -18,6 +19,16 @@ struct Strategies {
   }
 };
 
+// The light subpaths of a tile, one for each pixel, and which of them each pixel's eye vertices may be joined to: those of the pixels on
+// a lattice that it is on too, so that neighbours have different ones.
+struct TileLight {
+  static constexpr int kLattices = 16;
+  LightVertices vertices;
+  LightChoice choices[kLattices];
+  int counts[kLattices];  // of subpaths
+  static size_t lattice(int x, int y) { return size_t(x + 4 * y) % kLattices; }
+};
+
 struct EyeVertex {
   const ShadingPoint& point;
   const Bsdf& bsdf;
@@ -30,7 +41,10 @@ class BdptIntegrator final : public Integrator {
   explicit BdptIntegrator(const Parameters& p)
       : s_{{p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
             p.integer("transparent_bounces")},
-           {p.integer("heuristic") == 0}},
+           {p.integer("heuristic") == 0},
+           {},
+           p.real("connections")},
+        connections_(p.integer("connections")),
         strategies_{p.integer("only_s"), p.integer("only_t"), p.on("weighted")},
         min_bounces_(p.integer("min_bounces")),
         clamp_direct_(p.real("clamp_direct")),
@@ -40,40 +54,61 @@ class BdptIntegrator final : public Integrator {
     const FilmSpec& spec = film.spec();
     if (pass == 0) film.start_splats(splat_unit(context));
     s_.footprint = {context.camera, spec.width, spec.height};
-    for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result, uint32_t pixel) {
-      static thread_local LightSubpath light;
-      Sampler from_light = light_sampler(context, pass, spec.width * spec.height, pixel);
-      trace_from_light(context, s_, from_light, light);
-      splat(context, film, from_light, light);
-      trace(context, film, camera, light, sampler, result);
-    });
+    static thread_local TileLight light;
+    const auto from_light = [&](const Tile& tile) { shine(context, pass, film, tile, light); };
+    const auto from_eye = [&](const CameraRay& camera, Sampler& sampler, PixelSample& result, int x, int y) {
+      trace(context, film, camera, light, TileLight::lattice(x, y), sampler, result);
+    };
+    for_each_tile(context, pass, film, from_light, from_eye);
     film.end_splats(!context.cancelled);
   }
 
  private:
-  // t = 1: the light subpath joined to the lens.
-  void splat(const RenderContext& context, Film& film, Sampler& sampler, const LightSubpath& light) const {
+  // The light subpaths of a tile.
+  void shine(const RenderContext& context, int pass, Film& film, const Tile& tile, TileLight& light) const {
     const FilmSpec& spec = film.spec();
-    const int pixels = spec.width * spec.height;
-    const float count = float(spec.region_width() * spec.region_height());  // light subpaths of a pass
-    for (int k = 0; k < light.count; ++k) {
-      const LightVertex& v = light.vertices[size_t(k)];
-      sampler.jump_to(uint32_t(k) + 1);
-      sampler.next_2d(), sampler.next_2d();  // those the walk took
-      const Vec2 u_lens = sampler.next_2d(), u_pixel = sampler.next_2d();
-      const auto c = connect_to_lens(context, s_.limits, light, v, pixels, u_lens);
-      if (!c) continue;
-      // All light subpaths of a pass may fall on the pixel, its own eye subpath is one. [Georgiev 2012, eq. 46]
-      const float others = v.weights.sum(s_.heuristic, c->pdf_area / count, c->pdf_reverse);
-      const float weight = strategies_.weight(k + 2, 1, 1.0f / (1.0f + others));
-      if (weight == 0.0f) continue;
-      const Rgb value = c->value * passage_to_lens(context, s_.limits, v, c->lens) * (weight / count);
-      film.splat(c->lens.film, film_wraps(context.camera), clamp_contribution(value, k > 0 ? clamp_indirect_ : clamp_direct_), u_pixel);
+    light.vertices.clear();
+    for (LightChoice& choice : light.choices) choice.clear();
+    std::fill_n(light.counts, TileLight::kLattices, 0);
+    for (int y = tile.y0; y < tile.y1; ++y) {
+      for (int x = tile.x0; x < tile.x1; ++x) {
+        const uint32_t pixel = uint32_t(spec.y0 + y) * uint32_t(spec.width) + uint32_t(spec.x0 + x);
+        Sampler sampler = light_sampler(context, pass, spec.width * spec.height, pixel);
+        const size_t first = light.vertices.count(), lattice = TileLight::lattice(x, y);
+        trace_from_light(context, s_, sampler, light.vertices);
+        ++light.counts[lattice];
+        for (size_t k = first; k < light.vertices.count(); ++k) light.choices[lattice].add(light.vertices[k], uint32_t(k));
+        splat(context, film, sampler, light.vertices, first);
+      }
     }
   }
 
-  void trace(const RenderContext& context, const Film& film, const CameraRay& camera, const LightSubpath& light, Sampler& sampler,
-             PixelSample& result) const {
+  // t = 1: the light subpath from vertex `first` on joined to the lens.
+  void splat(const RenderContext& context, Film& film, Sampler& sampler, const LightVertices& vertices, size_t first) const {
+    const FilmSpec& spec = film.spec();
+    const int pixels = spec.width * spec.height;
+    const float count = float(spec.region_width() * spec.region_height());  // light subpaths of a pass
+    for (size_t k = first; k < vertices.count(); ++k) {
+      const LightVertex& v = vertices[k];
+      sampler.jump_to(uint32_t(k - first) + 1);
+      sampler.next_2d(), sampler.next_2d();  // those the walk took
+      const Vec2 u_lens = sampler.next_2d();
+      Vec2 u_pixel = sampler.next_2d();
+      const auto c = connect_to_lens(context, s_.limits, v, pixels, u_lens);
+      if (!c) continue;
+      // All light subpaths of a pass may fall on the pixel, its own eye subpath is one. [Georgiev 2012, eq. 46]
+      const float others = v.weights.sum(s_.heuristic, c->pdf_area * s_.joined / count, c->pdf_reverse);
+      const float weight = strategies_.weight(v.s(), 1, 1.0f / (1.0f + others)), alpha = worth_a_look(weight);
+      if (!(u_pixel.x < alpha)) continue;
+      u_pixel.x /= alpha;
+      const Rgb value = c->value * passage_to_lens(context, s_.limits, v, c->lens) * (weight / (alpha * count));
+      film.splat(c->lens.film, film_wraps(context.camera), clamp_contribution(value, v.is_first() ? clamp_direct_ : clamp_indirect_),
+                 u_pixel);
+    }
+  }
+
+  void trace(const RenderContext& context, const Film& film, const CameraRay& camera, const TileLight& light, size_t lattice,
+             Sampler& sampler, PixelSample& result) const {
     const Heuristic h = s_.heuristic;
     const float pixels = float(film.spec().width * film.spec().height);
     const float light_count = float(film.spec().region_width() * film.spec().region_height());
@@ -94,7 +129,7 @@ class BdptIntegrator final : public Integrator {
       float others = 0;
       if (path.state.depth > 0)
         others = h(pdf_direct) * weights.vcm +
-                 h(meets ? pdf_emit(context, emitter, path.origin.query.position, path.ray.direction) : 0.0f) * weights.vc;
+                 h(meets ? s_.joined * pdf_emit(context, emitter, path.origin.query.position, path.ray.direction) : 0.0f) * weights.vc;
       return radiance * strategies_.weight(0, path.state.depth + 2, 1.0f / (1.0f + others));
     };
 
@@ -121,13 +156,19 @@ class BdptIntegrator final : public Integrator {
       if (!(cos_in > 0.0f)) break;
       EyeVertex here{point, bsdf, weights.arrived(h, segment, cos_in), path.state};
       if (path.state.depth == 0)
-        here.weights = {h(light_count / (lens_density(context.camera, camera.ray, segment) * pixels * cos_in)), 0.0f};  // [eq. 45]
+        here.weights = {h(light_count / (s_.joined * lens_density(context.camera, camera.ray, segment) * pixels * cos_in)),
+                        0.0f};  // [eq. 45]
 
       const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
       const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
+      const float u_continue = sampler.next_1d(), u_joined = sampler.next_1d();
       if (may_scatter && !bsdf.is_delta()) {
         add(direct_light(context, here, u_light_choice, u_light), path.state.depth + 1);
-        for (int k = 0; k < light.count; ++k) add(connect(context, here, light, k), path.state.depth + 2);
+        const auto join = [&](uint32_t k, float times, float u_left) {
+          add(connect(context, here, light.vertices[k], u_left) / (times * float(light.counts[lattice])), path.state.depth + 2);
+        };
+        if (path.state.depth < s_.limits.total)
+          light.choices[lattice].draw(point.position, point.ng, bsdf.flags() & kTransmission, connections_, u_joined, join);
       }
 
       // Draw the next direction.
@@ -164,7 +205,7 @@ class BdptIntegrator final : public Integrator {
       // Russian roulette.
       const float alpha = path.state.depth <= min_bounces_ ? 1.0f : std::min(1.0f, max_component(path.throughput));
       if (alpha < 1.0f) {
-        if (sampler.next_1d() >= alpha) break;
+        if (u_continue >= alpha) break;
         path.throughput *= 1.0f / alpha;
       }
     }
@@ -182,17 +223,16 @@ class BdptIntegrator final : public Integrator {
     const float pdf_emitted = meets_light(context.scene, z.point) ? pdf_emit(context, light->light, z.point.position, light->wi) : 0.0f;
     if (pdf_emitted > 0.0f) {
       const float pdf_area = pdf_emitted * abs_dot(z.point.ng, light->wi) / light->pdf_dir;
-      others += z.weights.sum(h, pdf_area, z.weights.vc > 0.0f ? reverse(context, z, light->wi).pdf_dir : 0.0f);
+      others += h(s_.joined) * z.weights.sum(h, pdf_area, z.weights.vc > 0.0f ? reverse(context, z, light->wi).pdf_dir : 0.0f);
     }
     const float weight = strategies_.weight(1, z.state.depth + 2, 1.0f / (1.0f + others));
     return shadowed(context, z.point, *light, e.value * light->radiance * (weight / light->pdf_dir));
   }
 
   // s > 1, t > 1: both vertices joined. [Veach 1997, eq. 10.8]
-  Rgb connect(const RenderContext& context, const EyeVertex& z, const LightSubpath& light, int k) const {
+  Rgb connect(const RenderContext& context, const EyeVertex& z, const LightVertex& y, float u) const {
     const Heuristic h = s_.heuristic;
-    const LightVertex& y = light.vertices[size_t(k)];
-    if (y.bsdf.is_delta() || strategies_.weight(k + 2, z.state.depth + 2, 1.0f) == 0.0f) return Rgb();
+    if (strategies_.weight(y.s(), z.state.depth + 2, 1.0f) == 0.0f) return Rgb();
     const Vec3 to = y.point.position - z.point.position;
     const float distance = length(to);
     if (!(distance > 0.0f)) return Rgb();
@@ -206,8 +246,8 @@ class BdptIntegrator final : public Integrator {
     bounces.total += z.state.depth, bounces.diffuse += z.state.diffuse_depth, bounces.glossy += z.state.glossy_depth,
         bounces.transmission += z.state.transmission_depth;
     bounces.add(at_z);
-    if (!y.is_first) bounces.add(bounce_flags(y.bsdf, y.point, -w));
-    if (!bounces.within(s_.limits) || bounces.total > light.max_bounces) return Rgb();
+    if (!y.is_first()) bounces.add(bounce_flags(y.bsdf, y.point, -w));
+    if (!bounces.within(s_.limits) || bounces.total > y.max_bounces) return Rgb();
 
     // What passes: f at both ends and the geometry between, in the measure of the true normals.
     const LobeEval from_z = eval_seen_by(z.bsdf, z.point.wo, w, context.scene.instances()[y.point.instance].data->visibility);
@@ -222,17 +262,21 @@ class BdptIntegrator final : public Integrator {
     const float pdf_y = y.bsdf.eval(y.point.wo, -w).pdf_dir;
     const float others = y.weights.sum(h, from_z.pdf_dir * to_y, at_y.pdf_dir) +
                          z.weights.sum(h, pdf_y * to_z, z.weights.vc > 0.0f ? reverse(context, z, w).pdf_dir : 0.0f);
-    const Rgb contribution = value * strategies_.weight(k + 2, z.state.depth + 2, 1.0f / (1.0f + others));
-    if (is_black(contribution)) return Rgb();
+    const float weight = strategies_.weight(y.s(), z.state.depth + 2, 1.0f / (1.0f + others)), alpha = worth_a_look(weight);
+    if (is_black(value) || !(u < alpha)) return Rgb();
 
     const Vec3 start = offset_point(z.point.position, z.point.ng, w), end = offset_point(y.point.position, y.point.ng, -w);
     const float free = length(end - start);
     PathState state = z.state;
     const bool within = advance(state, at_z, s_.limits);
     (void)within;
-    return contribution * passage(context, {start, (end - start) / free, 0.0f, free * (1.0f - 1e-4f)}, visibility_of(state.kind), state,
-                                  s_.limits.transparent);
+    return value * (weight / alpha) *
+           passage(context, {start, (end - start) / free, 0.0f, free * (1.0f - 1e-4f)}, visibility_of(state.kind), state,
+                   s_.limits.transparent);
   }
+
+  // Russian roulette before the shadow ray of a connection, by its weight: little is lost where other ways do better.
+  static float worth_a_look(float weight) { return std::min(1.0f, weight * 20.0f); }
 
   // The density with which light that comes to z from w would go on to where z was seen from.
   static LobeEval reverse(const RenderContext& context, const EyeVertex& z, Vec3 w) {
@@ -282,6 +326,7 @@ class BdptIntegrator final : public Integrator {
   }
 
   SubpathSettings s_;
+  int connections_;
   Strategies strategies_;
   int min_bounces_;
   float clamp_direct_, clamp_indirect_;
@@ -316,6 +361,8 @@ const Descriptor& bdpt_descriptor() {
            "Largest radiance that one sample may add directly; 0 is off. Loses light"},
           {"clamp_indirect", "Clamp Indirect", Kind::kFloat, 0, 0, 1e9,
            "Largest radiance that one sample may add after a bounce; 0 is off. Loses light"},
+          {"connections", "Connections", Kind::kInt, 3, 1, 64,
+           "Vertices from the light that each vertex from the eye is joined to, of all those of 16 light paths"},
           {"only_s", "Only s", Kind::kInt, -1, -1, 1024, "Shows only paths with this many vertices from the light; -1: all"},
           {"only_t", "Only t", Kind::kInt, -1, -1, 1024,
            "Shows only paths with this many vertices from the eye, the lens among them; -1: all"},

@@ -56,18 +56,20 @@ class LightIntegrator final : public Integrator {
 
   // One particle, joined to the lens wherever it comes by.
   void shine(const RenderContext& context, Film& film, int count, Sampler& sampler) const {
-    static thread_local LightSubpath path;
+    static thread_local LightVertices path;
+    path.clear();
     trace_from_light(context, s_, sampler, path);
     const int pixels = film.spec().width * film.spec().height;
-    for (int k = 0; k < path.count; ++k) {
-      const LightVertex& v = path.vertices[size_t(k)];
+    for (size_t k = 0; k < path.count(); ++k) {
+      const LightVertex& v = path[k];
       sampler.jump_to(uint32_t(k) + 1);
       sampler.next_2d(), sampler.next_2d();  // those the walk took
       const Vec2 u_lens = sampler.next_2d(), u_pixel = sampler.next_2d();
-      const auto c = connect_to_lens(context, s_.limits, path, v, pixels, u_lens);
+      const auto c = connect_to_lens(context, s_.limits, v, pixels, u_lens);
       if (!c) continue;
       const Rgb value = c->value * passage_to_lens(context, s_.limits, v, c->lens) / float(count);
-      film.splat(c->lens.film, film_wraps(context.camera), clamp_contribution(value, k > 0 ? clamp_indirect_ : clamp_direct_), u_pixel);
+      film.splat(c->lens.film, film_wraps(context.camera), clamp_contribution(value, v.is_first() ? clamp_direct_ : clamp_indirect_),
+                 u_pixel);
     }
   }
 

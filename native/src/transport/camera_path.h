@@ -1,8 +1,6 @@
 // What every path from the camera does: it begins at each pixel, and at each ray it leaves the scene or arrives at a surface,
 // of which the first that is not see-through fills the data passes.
 #pragma once
-#include <type_traits>
-
 #include "core/sampler.h"
 #include "film/film.h"
 #include "transport/direct_light.h"
@@ -41,28 +39,33 @@ struct CameraRow {
   }
 };
 
-// Calls f(camera ray, sampler, sample to fill) for every pixel of the film, tile by tile in threads. Where f takes a fourth argument,
-// it is the pixel's number in the full frame.
-template <class F>
-void for_each_pixel(const RenderContext& context, int pass, Film& film, const F& f) {
+// Calls begin(tile) for every tile of the film, in threads, and then f(camera ray, sampler, sample to fill, x, y) for each of its pixels
+// (x, y) within the region.
+template <class Begin, class F>
+void for_each_tile(const RenderContext& context, int pass, Film& film, const Begin& begin, const F& f) {
   const FilmSpec& spec = film.spec();
   context.pool.for_each(int(film.tiles().size()), context.cancelled, [&](int index) {
     const Tile& tile = film.tiles()[size_t(index)];
+    begin(tile);
     for (int y = tile.y0; y < tile.y1; ++y) {
       const CameraRow row(context, film, spec.x0 + tile.x0, spec.y0 + y, pass);
       PixelSample samples[CameraRow::kWidth];
       for (int i = 0; i < tile.x1 - tile.x0; ++i) {
         if (context.lightmap && !context.lightmap->covers(spec.x0 + tile.x0 + i, spec.y0 + y)) continue;
         Sampler sampler = row.samplers.sampler(i);
-        if constexpr (std::is_invocable_v<F, const CameraRay&, Sampler&, PixelSample&, uint32_t>)
-          f(row.rays[i], sampler, samples[i], uint32_t(spec.y0 + y) * uint32_t(spec.width) + uint32_t(spec.x0 + tile.x0 + i));
-        else
-          f(row.rays[i], sampler, samples[i]);
+        f(row.rays[i], sampler, samples[i], tile.x0 + i, y);
       }
       film.add_row(index, y, pass, samples);
     }
     ++context.tiles_done;
   });
+}
+
+// Calls f(camera ray, sampler, sample to fill) for every pixel of the film, tile by tile in threads.
+template <class F>
+void for_each_pixel(const RenderContext& context, int pass, Film& film, const F& f) {
+  const auto pixel = [&](const CameraRay& ray, Sampler& sampler, PixelSample& sample, int, int) { f(ray, sampler, sample); };
+  for_each_tile(context, pass, film, [](const Tile&) {}, pixel);
 }
 
 // The data passes. Blender's rule: a surface counts from half opacity on.

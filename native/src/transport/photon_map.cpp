@@ -14,7 +14,7 @@ float sign_of(float x) { return x < 0.0f ? -1.0f : 1.0f; }
 // The limits of the eye, less what the light's part of the path has used up; nothing if that is more than there is.
 std::optional<Photon> within_limits(const LightVertex& v, const BounceLimits& limits, int most) {
   BounceCount used = v.bounces;
-  if (!v.is_first) used.add(kReflection | kDiffuse);
+  if (!v.is_first()) used.add(kReflection | kDiffuse);
   const int left[4] = {std::min(limits.total, most) - used.total, limits.diffuse - used.diffuse, limits.glossy - used.glossy,
                        limits.transmission - used.transmission};
   Photon photon;
@@ -29,7 +29,7 @@ std::optional<Photon> within_limits(const LightVertex& v, const BounceLimits& li
 // The part of a vertex's power that is of the wished classes.
 Rgb power_of(const LightVertex& v, uint8_t classes) {
   if (!(v.bsdf.flags() & kDiffuse) || !(v.seen_by & kRayDiffuse)) return Rgb();
-  if (v.is_first) return classes & kDirectPhoton ? v.power : Rgb();
+  if (v.is_first()) return classes & kDirectPhoton ? v.power : Rgb();
   Rgb share;
   if (classes & kCausticPhoton) share += v.by_mirrors;
   if (classes & kGlobalPhoton) share += Rgb(1.0f) - v.by_mirrors;
@@ -90,9 +90,10 @@ std::vector<Batch> for_each_path(const RenderContext& context, const SubpathSett
   constexpr int kBatch = 1024;
   std::vector<Batch> found(size_t((count + kBatch - 1) / kBatch));
   context.pool.for_each(int(found.size()), context.cancelled, [&](int b) {
-    static thread_local LightSubpath path;
+    static thread_local LightVertices path;
     for (int k = b * kBatch; k < std::min((b + 1) * kBatch, count); ++k) {
       Sampler sampler = light_sampler(context, pass, count, uint32_t(k));
+      path.clear();
       trace_from_light(context, settings, sampler, path);
       f(path, found[size_t(b)]);
     }
@@ -104,12 +105,12 @@ std::vector<Batch> for_each_path(const RenderContext& context, const SubpathSett
 
 std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes) {
   auto found =
-      for_each_path<std::vector<Photon>>(context, settings, pass, count, [&](const LightSubpath& path, std::vector<Photon>& photons) {
-        for (int i = 0; i < path.count; ++i) {
-          const LightVertex& v = path.vertices[size_t(i)];
+      for_each_path<std::vector<Photon>>(context, settings, pass, count, [&](const LightVertices& path, std::vector<Photon>& photons) {
+        for (int i = 0; i < int(path.count()); ++i) {
+          const LightVertex& v = path[size_t(i)];
           const Rgb power = power_of(v, classes);
           if (is_black(power)) continue;
-          auto photon = within_limits(v, settings.limits, path.max_bounces);
+          auto photon = within_limits(v, settings.limits, v.max_bounces);
           if (!photon) continue;
           photon->position = v.point.position, photon->wi = PackedDirection(v.point.wo), photon->normal = PackedDirection(v.point.ng);
           photon->power[0] = power.r(), photon->power[1] = power.g(), photon->power[2] = power.b();
@@ -159,10 +160,10 @@ EmissionGuide learn_emission(const RenderContext& context, SubpathSettings setti
     // Numbered apart from the paths that count: what is learnt from a path must not decide on the same path.
     const int pass = -1 - round;
     const auto found =
-        for_each_path<std::vector<EmissionGuide::Trial>>(context, settings, pass, count, [&](const LightSubpath& path, auto& trials) {
+        for_each_path<std::vector<EmissionGuide::Trial>>(context, settings, pass, count, [&](const LightVertices& path, auto& trials) {
           float worth = 0.0f;
-          for (int i = 0; i < path.count; ++i) {
-            const LightVertex& v = path.vertices[size_t(i)];
+          for (int i = 0; i < int(path.count()); ++i) {
+            const LightVertex& v = path[size_t(i)];
             const Rgb power = power_of(v, classes);
             if (!is_black(power) && seen.near(v.point.position)) worth += average(power);
           }

@@ -78,20 +78,19 @@ Rgb passage(const RenderContext& context, Ray ray, uint32_t visibility, PathStat
   return Rgb();
 }
 
-void trace_from_light(const RenderContext& context, const SubpathSettings& settings, Sampler& sampler, LightSubpath& path) {
+void trace_from_light(const RenderContext& context, const SubpathSettings& settings, Sampler& sampler, LightVertices& vertices) {
   const Heuristic h = settings.heuristic;
-  path.count = 0;
   const float u_choice = sampler.next_1d();
   const Vec2 u_place = sampler.next_2d(), u_direction = sampler.next_2d();
-  EmissionNumbers& u = path.start = {u_choice, u_place.x, u_place.y, u_direction.x, u_direction.y};
+  EmissionNumbers& u = vertices.start = {u_choice, u_place.x, u_place.y, u_direction.x, u_direction.y};
   const float weight = settings.guide ? settings.guide->warp(u) : 1.0f;
   const auto emitted = context.lights.emit(u[0], {u[1], u[2]}, {u[3], u[4]});
   if (!emitted || !emitted->cast_shadow) return;
   const LampData* lamp = context.lights.lamp(emitted->light);
-  path.max_bounces = lamp ? lamp->max_bounces : context.lights.is_world(emitted->light) ? context.scene.data().world.max_bounces : 1024;
   Ray ray = emitted->ray;
   PathState state = unknown_state();
   LightVertex carried;  // what the next vertex begins with; its point and lobes are not used
+  carried.max_bounces = lamp ? lamp->max_bounces : context.lights.is_world(emitted->light) ? context.scene.data().world.max_bounces : 1024;
   Rgb passed(1.0f);     // by see-through surfaces on the way
   float travelled = 0;
 
@@ -100,33 +99,34 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     const auto hit = context.scene.intersect(ray, kIndirect);
     if (!hit) return;
     const uint32_t visible = context.scene.instances()[hit->instance].data->visibility;
-    if (path.vertices.size() <= size_t(path.count)) path.vertices.emplace_back();
-    LightVertex& v = path.vertices[size_t(path.count)];
+    LightVertex& v = vertices.grow();
     v.point = context.scene.shading_point(ray, *hit, state);
-    if (carried.is_first && !(visible & kRayShadow)) {  // throws no shadow: the light goes on as if nothing were there
+    if (carried.is_first() && !(visible & kRayShadow)) {  // throws no shadow: the light goes on as if nothing were there
       ray = {offset_point(v.point.position, v.point.ng, ray.direction), ray.direction};
       continue;
     }
     v.point.footprint = settings.footprint(v.point.position);
     context.scene.shade(v.point, v.bsdf);
     const float cos_in = abs_dot(v.point.ng, v.point.wo);
-    v.bounces = carried.bounces, v.seen_by = carried.seen_by, v.is_first = carried.is_first, v.by_mirrors = carried.by_mirrors;
+    v.bounces = carried.bounces, v.seen_by = carried.seen_by, v.scattered = carried.scattered, v.by_mirrors = carried.by_mirrors;
+    v.max_bounces = carried.max_bounces;
     if (!(cos_in > 0.0f)) return;
-    if (v.is_first) {
+    if (v.is_first()) {
       const auto light = context.lights.arriving(*emitted, light_query(v.point, v.bsdf));
       const float pdf_emit = context.lights.pdf_emit(emitted->light, v.point.position, v.point.wo);
       if (!light || !(pdf_emit > 0.0f)) return;
       // Densities of one path's two ends as sampled directly and by itself. [Georgiev 2012, eq. 31, 32 and 48 to 52, here per steradian and
       // area at this vertex, which serves lights near and far alike]
-      v.weights.vcm = h(light->pdf_dir / (pdf_emit * cos_in));
-      v.weights.vc = light->is_delta || !light->use_mis ? 0.0f : h(1.0f / (pdf_emit * cos_in));
+      const float pdf_joined = pdf_emit * cos_in * settings.joined;
+      v.weights.vcm = h(light->pdf_dir / pdf_joined);
+      v.weights.vc = light->is_delta || !light->use_mis ? 0.0f : h(1.0f / pdf_joined);
       v.power = light->radiance * passed * (weight / pdf_emit);
       v.seen_by = light->visibility;
     } else {
       v.weights = carried.weights.arrived(h, travelled + hit->t, cos_in);
       v.power = carried.power * passed;
     }
-    ++path.count;
+    vertices.keep();
 
     // Draw the next direction.
     const float u_lobe = sampler.next_1d(), u_continue = sampler.next_1d();
@@ -140,8 +140,9 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
       continue;
     }
     carried.bounces = v.bounces;
-    if (!v.is_first) carried.bounces.add(next->flags);
-    if (!carried.bounces.within(settings.limits)) return;
+    if (!v.is_first()) carried.bounces.add(next->flags);
+    // The next vertex will have to scatter too.
+    if (!carried.bounces.within(settings.limits) || carried.bounces.total >= std::min(settings.limits.total, v.max_bounces)) return;
 
     // What the surface makes of the light as seen from where it goes, in the measure of the true normal. [Veach 1997, §5.3]
     const float cos_out = abs_dot(v.point.ng, next->wi);
@@ -163,14 +164,14 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     carried.weights = v.weights.scattered(h, is_delta, cos_out, next->pdf_dir, pdf_reverse);
     carried.by_mirrors = is_delta ? v.by_mirrors : v.by_mirrors * (Rgb(1.0f) - diffuse_share(v, next->wi));
     if (settings.only_by_mirrors && is_black(carried.by_mirrors)) return;
-    carried.is_first = false, carried.seen_by = visible;
+    carried.scattered = v.scattered + 1, carried.seen_by = visible;
     passed = Rgb(1.0f), travelled = 0;
     ray = {offset_point(v.point.position, v.point.ng, next->wi), next->wi};
   }
 }
 
-std::optional<LensConnection> connect_to_lens(const RenderContext& context, const BounceLimits& limits, const LightSubpath& path,
-                                              const LightVertex& v, int pixels, Vec2 u_lens) {
+std::optional<LensConnection> connect_to_lens(const RenderContext& context, const BounceLimits& limits, const LightVertex& v, int pixels,
+                                              Vec2 u_lens) {
   const InstanceData& instance = *context.scene.instances()[v.point.instance].data;
   if (v.bsdf.is_delta() || instance.holdout || !(instance.visibility & kRayCamera)) return {};
   const auto lens = sample_lens(context.camera, v.point.position, u_lens);
@@ -178,8 +179,8 @@ std::optional<LensConnection> connect_to_lens(const RenderContext& context, cons
   const LobeEval e = eval_turned(context, v.point, v.bsdf, lens->wi, PathState(), v.seen_by);
   if (is_black(e.value)) return {};
   BounceCount bounces = v.bounces;
-  if (!v.is_first) bounces.add(bounce_flags(v.bsdf, v.point, lens->wi));
-  if (!bounces.within(limits) || bounces.total > path.max_bounces) return {};
+  if (!v.is_first()) bounces.add(bounce_flags(v.bsdf, v.point, lens->wi));
+  if (!bounces.within(limits) || bounces.total > v.max_bounces) return {};
   const float cos_in = abs_dot(v.point.ng, v.point.wo), cos_out = abs_dot(v.point.ng, lens->wi);
   LensConnection c{*lens, v.power * e.value * (cos_out / cos_in * lens->density * float(pixels)), 0.0f, e.pdf_dir};
   const Ray seen{v.point.position + lens->wi * lens->free, -lens->wi};

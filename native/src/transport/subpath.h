@@ -53,15 +53,30 @@ struct LightVertex {
   PartialWeights weights;
   BounceCount bounces;   // on the way here
   uint32_t seen_by = 0xffffffffu;  // RayKind bits: what of this surface sees where the light comes from
-  bool is_first = true;            // lit by the luminaire itself
   Rgb by_mirrors{1.0f};            // the share of its power that no diffuse lobe scattered on the way
+  int scattered = 0;               // times on the way here, see-through surfaces left out; 0: lit by the luminaire itself
+  int max_bounces = 1024;          // of the luminaire
+  bool is_first() const { return scattered == 0; }
+  int s() const { return scattered + 2; }  // vertices up to here, the one on the luminaire among them
 };
 
-struct LightSubpath {
-  std::vector<LightVertex> vertices;  // of which `count` are in use: they are large, and kept
-  int count = 0;
-  int max_bounces = 1024;  // of the luminaire
-  EmissionNumbers start{}; // what it began with
+// Of any number of light subpaths. Large, and kept for the next.
+class LightVertices {
+ public:
+  LightVertex& grow() {
+    if (all_.size() == count_) all_.emplace_back();
+    return all_[count_];
+  }
+  void keep() { ++count_; }  // what grow() gave
+  void clear() { count_ = 0; }
+  size_t count() const { return count_; }
+  const LightVertex& operator[](size_t i) const { return all_[i]; }
+
+  EmissionNumbers start{};  // what the last subpath began with
+
+ private:
+  std::vector<LightVertex> all_;
+  size_t count_ = 0;
 };
 
 // The radius of a pixel on a surface that is seen directly: what textures and bumps of both kinds of subpath are filtered by.
@@ -82,10 +97,12 @@ struct SubpathSettings {
   PixelFootprint footprint{};
   const EmissionGuide* guide = nullptr;  // which strategies that weigh densities against others' know nothing of
   bool only_by_mirrors = false;  // ends at the first vertex all of whose light diffuse lobes scattered
+  float joined = 1;  // light subpaths that each eye vertex is joined to, as the weights have it
 };
 
-// Follows light from a luminaire chosen by its power. Lamps that throw no shadow are left to strategies that meet or choose them.
-void trace_from_light(const RenderContext& context, const SubpathSettings& settings, Sampler& sampler, LightSubpath& path);
+// Follows light from a luminaire chosen by its power, and adds the surfaces that it meets. Lamps that throw no shadow are left to
+// strategies that meet or choose them.
+void trace_from_light(const RenderContext& context, const SubpathSettings& settings, Sampler& sampler, LightVertices& vertices);
 
 // What the surface at `point`, seen from `w`, makes of light from point.wo: f |cos θ| for light that comes from there, and the density
 // with which it would be followed from w to there. `bsdf` is the surface's as seen from point.wo.
@@ -117,8 +134,8 @@ struct LensConnection {
   float pdf_area = 0;       // of the vertex, by the rays of one sample for each pixel
   float pdf_reverse = 0;    // of the vertex before, per steradian
 };
-std::optional<LensConnection> connect_to_lens(const RenderContext& context, const BounceLimits& limits, const LightSubpath& path,
-                                              const LightVertex& vertex, int pixels, Vec2 u_lens);
+std::optional<LensConnection> connect_to_lens(const RenderContext& context, const BounceLimits& limits, const LightVertex& vertex,
+                                              int pixels, Vec2 u_lens);
 Rgb passage_to_lens(const RenderContext& context, const BounceLimits& limits, const LightVertex& vertex, const LensSample& lens);
 
 // What one count of the film's splats is worth in this scene: about 10⁻¹³ of what it sends to its surroundings.
