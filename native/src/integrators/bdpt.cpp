@@ -1,5 +1,6 @@
 // Bidirectional path tracing: a subpath from the light and one from the eye, every vertex of the one joined to every vertex of the
-// other, all ways to make the same path weighed against one another [Lafortune & Willems 1993; Veach 1997, ch. 10].
+// other, all ways to make the same path weighed against one another [Lafortune & Willems 1993; Veach 1997, ch. 10]. The vertices of the
+// other are drawn from those of several light subpaths, which the weights take as so many samples [Veach 1997, §9.2.1; Popov 2015].
 #include "integrators/integrator.h"
 #include "transport/camera_path.h"
 #include "transport/light_choice.h"
@@ -13,6 +14,7 @@ namespace {
 struct Strategies {
   int s, t;  // the one that is shown alone; negative: any
   bool weighted;
+  bool shows(int s_of_path) const { return s < 0 || s == s_of_path; }
   float weight(int s_of_path, int t_of_path, float w) const {
     if ((s >= 0 && s != s_of_path) || (t >= 0 && t != t_of_path)) return 0.0f;
     return weighted ? w : 1.0f;
@@ -77,7 +79,8 @@ class BdptIntegrator final : public Integrator {
         const size_t first = light.vertices.count(), lattice = TileLight::lattice(x, y);
         trace_from_light(context, s_, sampler, light.vertices);
         ++light.counts[lattice];
-        for (size_t k = first; k < light.vertices.count(); ++k) light.choices[lattice].add(light.vertices[k], uint32_t(k));
+        for (size_t k = first; k < light.vertices.count(); ++k)
+          if (strategies_.shows(light.vertices[k].s())) light.choices[lattice].add(light.vertices[k], uint32_t(k));
         splat(context, film, sampler, light.vertices, first);
       }
     }
@@ -142,6 +145,8 @@ class BdptIntegrator final : public Integrator {
         add(leave(context, film, path, found, result), path.state.depth);
         break;
       }
+
+      if (!may_scatter && ends_unlit(context, path, *hit)) break;
 
       // Arrive: the footprint is that of a surface seen directly, for both kinds of subpath must see the same textures.
       const float segment = travelled + hit->t;
@@ -273,6 +278,12 @@ class BdptIntegrator final : public Integrator {
     return value * (weight / alpha) *
            passage(context, {start, (end - start) / free, 0.0f, free * (1.0f - 1e-4f)}, visibility_of(state.kind), state,
                    s_.limits.transparent);
+  }
+
+  // Past its last bounce the path only looks for luminaires.
+  static bool ends_unlit(const RenderContext& context, const CameraPath& path, const Hit& hit) {
+    const Program& program = context.scene.material(context.scene.material_of(hit.instance, hit.triangle)).program;
+    return !path.seen_from_camera && !program.has_transparency() && !program.has_emission();
   }
 
   // Russian roulette before the shadow ray of a connection, by its weight: little is lost where other ways do better.

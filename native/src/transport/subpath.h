@@ -95,9 +95,9 @@ struct SubpathSettings {
   BounceLimits limits;
   Heuristic heuristic{};
   PixelFootprint footprint{};
+  float joined = 1;  // light subpaths that each eye vertex is joined to, as the weights have it
   const EmissionGuide* guide = nullptr;  // which strategies that weigh densities against others' know nothing of
   bool only_by_mirrors = false;  // ends at the first vertex all of whose light diffuse lobes scattered
-  float joined = 1;  // light subpaths that each eye vertex is joined to, as the weights have it
 };
 
 // Follows light from a luminaire chosen by its power, and adds the surfaces that it meets. Lamps that throw no shadow are left to
