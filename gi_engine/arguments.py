@@ -33,6 +33,12 @@ def parser(commands_by_name: dict, in_blender: bool) -> argparse.ArgumentParser:
         metavar="OUT.png|.exr",
         help="default: where the scene says; '#'s hold the frame number",
     )
+    render.add_argument(
+        "--strategies",
+        type=Path,
+        metavar="DIR",
+        help="instead of the picture: every strategy of a bidirectional integrator, weighted and not, into this folder",
+    )
     render.add_argument("--resolution", type=resolution, metavar="WxH", help="pixels")
     render.add_argument(
         "--frame", type=frames, metavar="N|A-B", help="one frame or a range; default: the scene's current frame"

@@ -65,6 +65,8 @@ def render_command(arguments, out, err) -> int:
         scene = headless.bpy.context.scene
         settle(arguments, headless, scene)
         with display_on(err) as display:
+            if arguments.strategies is not None:
+                return render_strategies(arguments, headless, scene, wishes, display, (out, err))
             return render_frames(arguments, headless, scene, wishes, display, (out, err))
 
 
@@ -101,10 +103,51 @@ def check_render(arguments) -> None:
     native.module()
     if arguments.integrator is not None:
         find_integrator(arguments.integrator)
+    if arguments.strategies is not None:
+        if arguments.output is not None or len(arguments.frame or ()) > 1:
+            raise ArgumentError(
+                "--strategies: writes one frame into its folder; leave --output and ranges of frames out"
+            )
+        check_folder(arguments.strategies)
     if arguments.output is not None:
         check_suffix(arguments.output)
         with Target(arguments.output):
             pass
+
+
+def check_folder(path: Path) -> None:
+    """Makes the folder where it is missing. Raises OutputError."""
+    try:
+        path.mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f'output folder "{path}" cannot be made: {error.strerror}') from error
+    with Target(path / "strategies"):
+        pass
+
+
+def render_strategies(arguments, headless, scene, wishes: Control, display, streams) -> int:
+    from . import strategies
+    from .export import ExportError
+    from .session import RenderFailed
+
+    out, err = streams
+    if arguments.frame:
+        scene.frame_set(arguments.frame[0])
+    display.begin(arguments.strategies.name)
+    wishes.on_progress = display.update
+    try:
+        made = strategies.render(headless.bpy.context, arguments.strategies, arguments.integrator, control.cancelled)
+    except strategies.StrategyError as error:
+        raise ArgumentError(f"--strategies: {error}") from error
+    except (ExportError, RenderFailed) as error:
+        raise RenderError(str(error)) from error
+    if made is None:
+        display.say("gi-engine: cancelled; nothing is written", err)
+        return CANCELLED
+    for warning in made.warnings:
+        control.warn(warning)
+    display.say(f"{arguments.strategies}: {len(made.images)} pictures and two sheets of {len(made.images) // 2}", out)
+    return DONE
 
 
 def render_frame(arguments, headless, scene, frame: int, wishes: Control, display) -> tuple[list, int]:

@@ -17,14 +17,19 @@ class RenderFailed(RuntimeError):
 class Session:
     """Owns the native scene and session. Use as a context manager: leaving it stops the threads."""
 
-    def __init__(self, scene: Scene, settings: Settings, lightmap: Lightmap | None = None):
+    def __init__(self, scene: Scene, settings: Settings, lightmap: Lightmap | None = None, built=None):
+        self.scene = scene
         try:
-            self.native_scene = native.build_scene(scene, settings.threads)
+            self.native_scene = built or native.build_scene(scene, settings.threads)
             self.native = native.module().Session(self.native_scene, scene.camera, scene.film, settings, lightmap)
         except native.NativeMissing:
             raise
         except (ValueError, RuntimeError) as error:  # bad input, a library that fails
             raise RenderFailed(str(error)) from error
+
+    def again(self, settings: Settings) -> Session:
+        """Another render of the scene that was built."""
+        return Session(self.scene, settings, built=self.native_scene)
 
     def __enter__(self) -> Session:
         self.native.start()

@@ -6,6 +6,7 @@ import bpy
 
 from .. import native
 from ..export.settings import SHARED, value_of
+from ..strategies import has_strategies
 from .panel import Panel, RenderPanel, columns, has_setting, setting
 
 BOUNCES = (
@@ -47,6 +48,8 @@ class GI_RENDER_PT_integrator(RenderPanel, bpy.types.Panel):
                 row.prop(own, parameter["name"])
             elif parameter["name"] == "light_threshold":
                 setting(column, scene, "light_threshold")
+        if has_strategies(parameters(scene)):
+            self.layout.operator("gi_engine.render_strategies", icon="RENDER_RESULT")
 
 
 def matters(own, name: str) -> bool:
