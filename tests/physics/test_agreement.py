@@ -54,6 +54,13 @@ def test_bidirectional_agrees_with_path_tracing(name):
     assert_agree(measured("path", name, "perspective", 16), measured("bdpt", name, "perspective", 8))
 
 
+@pytest.mark.parametrize("connections", [1, 40])
+@pytest.mark.parametrize("name", ["rough glass", "transparent shadows"])
+def test_the_number_of_connections_does_not_change_the_mean(name, connections):
+    found = measured("bdpt", name, "perspective", 8, connections=connections)
+    assert_agree(measured("path", name, "perspective", 16), found)
+
+
 @pytest.mark.parametrize("name", SCENES)  # not CAUSTICS: see MIRRORS
 def test_light_tracing_agrees_with_path_tracing(name):
     assert_agree(measured("path", name, "perspective", 16), measured("light", name, "perspective", 32))

@@ -28,7 +28,8 @@ struct TileLight {
   LightVertices vertices;
   LightChoice choices[kLattices];
   int counts[kLattices];  // of subpaths
-  static size_t lattice(int x, int y) { return size_t(x + 4 * y) % kLattices; }
+  int slope = 4;          // of the lattices, another for each tile and pass, so that no pattern stays
+  size_t lattice(int x, int y) const { return size_t(x + slope * y) % kLattices; }
 };
 
 struct EyeVertex {
@@ -59,7 +60,7 @@ class BdptIntegrator final : public Integrator {
     static thread_local TileLight light;
     const auto from_light = [&](const Tile& tile) { shine(context, pass, film, tile, light); };
     const auto from_eye = [&](const CameraRay& camera, Sampler& sampler, PixelSample& result, int x, int y) {
-      trace(context, film, camera, light, TileLight::lattice(x, y), sampler, result);
+      trace(context, film, camera, light, light.lattice(x, y), sampler, result);
     };
     for_each_tile(context, pass, film, from_light, from_eye);
     film.end_splats(!context.cancelled);
@@ -69,6 +70,8 @@ class BdptIntegrator final : public Integrator {
   // The light subpaths of a tile.
   void shine(const RenderContext& context, int pass, Film& film, const Tile& tile, TileLight& light) const {
     const FilmSpec& spec = film.spec();
+    constexpr int kSlopes[] = {4, 12, 6, 10};  // points of the same lattice are far apart
+    light.slope = kSlopes[hash_combine(hash_combine(uint32_t(tile.x0), uint32_t(tile.y0)), uint32_t(pass)) & 3];
     light.vertices.clear();
     for (LightChoice& choice : light.choices) choice.clear();
     std::fill_n(light.counts, TileLight::kLattices, 0);
@@ -76,7 +79,7 @@ class BdptIntegrator final : public Integrator {
       for (int x = tile.x0; x < tile.x1; ++x) {
         const uint32_t pixel = uint32_t(spec.y0 + y) * uint32_t(spec.width) + uint32_t(spec.x0 + x);
         Sampler sampler = light_sampler(context, pass, spec.width * spec.height, pixel);
-        const size_t first = light.vertices.count(), lattice = TileLight::lattice(x, y);
+        const size_t first = light.vertices.count(), lattice = light.lattice(x, y);
         trace_from_light(context, s_, sampler, light.vertices);
         ++light.counts[lattice];
         for (size_t k = first; k < light.vertices.count(); ++k)
