@@ -4,8 +4,8 @@
 
 Each way renders each scene (files, or words in names of the shared scenes) for about S seconds of sampling, once per seed, in a process of
 its own. The error is the relative mean squared one, (x − r)² / (r² + (mean r / 10)²), of the worst pixels without a thousandth; `spread` is
-the same between seeds, which no difference between the engines can touch. The reference is a long render by another seed and the way that is
-least noisy per second. Denoising, adaptive sampling, clamping and Filter Glossy are off, caustics are on, bounces are the scene's own.
+the same between seeds, which no difference between the engines can touch, nor what a biased way is off. The reference is a long render by
+another seed and the unbiased way that is least noisy per second. Denoising, adaptive sampling, clamping and Filter Glossy are off, caustics are on, bounces are the scene's own.
 Writes bench/results/equal_time.json, .md, and pictures side by side."""
 
 from __future__ import annotations
@@ -29,8 +29,11 @@ WAYS = {
     "bdpt": ("GI_ENGINE", "bdpt"),
     "light": ("GI_ENGINE", "light"),
     "irradiance_cache": ("GI_ENGINE", "irradiance_cache"),
+    "photon_map": ("GI_ENGINE", "photon_map"),
+    "sppm": ("GI_ENGINE", "sppm"),
     "cycles": ("CYCLES", ""),
 }
+UNBIASED = ("bdpt", "path")  # of which one makes the reference
 RESULTS = ROOT / "bench" / "results"
 LIMIT = 1800  # seconds
 
@@ -135,7 +138,7 @@ def measure_scene(file: Path, options) -> dict:
     found = {way: run_child(file, way, options, options.seconds, options.seeds, 1) for way in options.ways}
     last = {way: [o["image"] for o in found[way] if o["wanted"] == options.seconds[-1]] for way in options.ways}
     rough = np.mean([image for images in last.values() for image in images], 0)
-    calmest = min((w for w in options.ways if w != "cycles"), key=lambda w: spread(last[w], rough))
+    calmest = min((w for w in UNBIASED if w in options.ways), key=lambda w: spread(last[w], rough), default=UNBIASED[0])
     reference = run_child(file, calmest, options, [options.reference], 1, 7)[0]["image"]
     row = {"scene": file.stem, "reference": calmest, "ways": {}}
     for way in options.ways:
