@@ -5,6 +5,7 @@ import functools
 import numpy as np
 import pytest
 from agreement_scenes import CAMERAS, CAUSTICS, SCENES, WIDE
+from light_scenes import lamp, matrix
 
 from gi_engine import scene_data as sd
 from gi_engine.session import Session
@@ -140,3 +141,20 @@ def test_weights_add_up_to_one(heuristic):
         ),
         2.0,
     )
+
+
+@pytest.mark.parametrize("bounces", [0, 1, 7])
+def test_bidirectional_in_an_integrating_sphere(bounces):
+    """Unit sphere of albedo .5, intensity pi at its centre: n bounces leave 1 - 2^-(n+1) [pbrt-v4]."""
+    from test_closed_forms import check, probe, scene_of, sphere, surface
+
+    bulb = lamp("POINT", (4 * np.pi * np.pi,) * 3, matrix=matrix((0, 0, 0)))
+    limits = {"max_bounces": bounces, "diffuse_bounces": bounces, "samples": 64}
+    found = probe(
+        scene_of((sphere(), surface(0.5)), lights=[bulb]),
+        (0.2, 0.1, 0.0),
+        (0.5, 0.3, 0.7),
+        integrator="bdpt",
+        **limits,
+    )
+    check(found, 1 - 0.5 ** (bounces + 1), rounding=2e-3)
