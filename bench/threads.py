@@ -2,15 +2,14 @@
 
     python bench/threads.py [--pixels N] [--seconds S] [--threads N …] [--ways ID …] [WORD …]
 
-Scenes are files, or words in names of the shared scenes. Prints a table; the processor time of a sample beside it says what a busy machine
-does to the rate. Best of three, since a thread can only be held up."""
+Scenes are files, or words in names of the shared scenes. Prints a table. Best of three, since a thread can only be held up: a
+machine that does other work meanwhile shows less than there is."""
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
 import os
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,9 +18,8 @@ from measure import prepare, scenes
 ROUNDS = 3
 
 
-def rate(session, seconds: float) -> tuple[float, float]:
-    """Passes a second, and processor seconds of a pass."""
-    cpu = time.process_time()
+def rate(session, seconds: float) -> float:
+    """Passes a second."""
     with session:
         while not session.wait() and session.progress()["seconds"] < seconds:
             pass
@@ -29,8 +27,7 @@ def rate(session, seconds: float) -> tuple[float, float]:
         while not session.native.wait(0.05):
             pass
         progress = session.progress()
-    passes = max(progress["passes"], 1)
-    return passes / progress["seconds"], (time.process_time() - cpu) / passes
+    return progress["passes"] / progress["seconds"]
 
 
 def main() -> None:
@@ -49,8 +46,8 @@ def main() -> None:
     from gi_engine.session import Session
 
     gi_engine.register()
-    print("| scene | way | threads | samples/s | times one thread | processor time of a sample, of one thread's |")
-    print("|---|---|---|---|---|---|")
+    print("| scene | way | threads | samples/s | times one thread |")
+    print("|---|---|---|---|---|")
     for file in [Path(w) for w in options.words if w.endswith(".blend")] or scenes(options.words):
         bpy.ops.wm.open_mainfile(filepath=str(file), load_ui=False, use_scripts=False)
         prepare(bpy.context.scene, SimpleNamespace(engine="GI_ENGINE", pixels=options.pixels, threads=1))
@@ -64,10 +61,9 @@ def main() -> None:
                     rate(built.again(dataclasses.replace(settings, threads=threads)), options.seconds)
                     for _ in range(ROUNDS)
                 ]
-                speed, cost = max(s for s, _ in some), min(c for _, c in some)
-                first = first or (speed, cost)
-                times = f"{speed / first[0]:.2f} | {cost / first[1]:.2f}"
-                print(f"| {file.stem} | {way} | {threads} | {speed:.1f} | {times} |", flush=True)
+                speed = max(some)
+                first = first or speed
+                print(f"| {file.stem} | {way} | {threads} | {speed:.1f} | {speed / first:.2f} |", flush=True)
     os._exit(0)
 
 
