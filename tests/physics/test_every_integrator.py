@@ -1,7 +1,9 @@
 """What every integrator must do, those to come included: they are taken from the registry."""
 
 import math
+import os
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -89,6 +91,21 @@ def test_it_counts_its_passes(integrator):
     assert seen[-1]["passes"] == 5 and seen[-1]["rays"] > 0 and not seen[-1].get("error")
     for before, after in zip(seen, seen[1:], strict=False):
         assert before["passes"] <= after["passes"] and before["rays"] <= after["rays"]
+
+
+@every
+def test_sessions_leave_no_memory_behind(integrator):
+    def resident():
+        pages = Path("/proc/self/statm").read_text().split()[1]
+        return int(pages) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+    found = []
+    for _ in range(12):
+        with session_of(integrator, 1, 32, **FEW) as session:
+            while not session.wait():
+                pass
+        found.append(resident())
+    assert found[-1] - found[5] < 20, found
 
 
 @every

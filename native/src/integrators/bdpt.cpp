@@ -57,9 +57,9 @@ class BdptIntegrator final : public Integrator {
     const FilmSpec& spec = film.spec();
     if (pass == 0) film.start_splats(splat_unit(context));
     s_.footprint = {context.camera, spec.width, spec.height};
-    static thread_local TileLight light;
-    const auto from_light = [&](const Tile& tile) { shine(context, pass, film, tile, light); };
+    const auto from_light = [&](const Tile& tile) { shine(context, pass, film, tile, tile_light()); };
     const auto from_eye = [&](const CameraRay& camera, Sampler& sampler, PixelSample& result, int x, int y) {
+      const TileLight& light = tile_light();
       trace(context, film, camera, light, light.lattice(x, y), sampler, result);
     };
     for_each_tile(context, pass, film, from_light, from_eye);
@@ -67,6 +67,12 @@ class BdptIntegrator final : public Integrator {
   }
 
  private:
+  // Of the thread. Asked for by a function, since only what passes the declaration of a thread's variable makes one and ends it.
+  static TileLight& tile_light() {
+    static thread_local TileLight light;
+    return light;
+  }
+
   // The light subpaths of a tile.
   void shine(const RenderContext& context, int pass, Film& film, const Tile& tile, TileLight& light) const {
     const FilmSpec& spec = film.spec();
