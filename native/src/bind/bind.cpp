@@ -22,6 +22,7 @@ NB_MODULE(_core, m) {
   gi::bind::bind_evaluate(m);
   gi::bind::bind_bsdf(m);
   gi::bind::bind_lights(m);
+  gi::bind::bind_guide(m);
   gi::bind::bind_points(m);
   gi::bind::bind_irradiance(m);
 }

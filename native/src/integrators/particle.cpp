@@ -2,12 +2,19 @@
 // in its texels [Pattanaik & Mudur 1992]; the eye then reads the texels' irradiance at the first diffuse surface of its paths.
 #include "integrators/integrator.h"
 #include "transport/diffuse_end.h"
+#include "transport/emission_guide.h"
 #include "transport/texels.h"
 
 namespace gi {
 namespace {
 
-constexpr uint32_t kParticleStream = 0x70617274u;
+constexpr uint32_t kParticleStream = 0x70617274u, kAimStream = 0x61696d65u;
+constexpr int kRoundsOfAPass = 8;      // a round, to learn where to aim, has this part of a pass's particles
+constexpr int kLeastRound = 1 << 12;   // but no fewer than these
+constexpr int kLeastRounds = 3, kMostRounds = 24;
+constexpr size_t kMostTrials = 1 << 19;  // that a guide is made of, about
+constexpr double kWellAimed = 5000;    // particles' worth of knowledge that ends the learning
+constexpr int kMostLookers = 1 << 14;  // paths from the eye that show what is seen
 constexpr uint8_t kAllLobes = kDiffuse | kGlossy | kSpecular | kTransparent;
 constexpr uint32_t kMostLayers = 64;  // that light without shadows passes
 constexpr int kBatch = 1024;  // particles that a thread takes at a time
@@ -19,7 +26,7 @@ struct ParticleSettings {
   double texel_size;
   size_t texel_memory;
   DirectLight direct;
-  bool gather;
+  bool gather, aim;
   BounceLimits limits;
   bool reflective_caustics, refractive_caustics;
 };
@@ -69,6 +76,7 @@ class ParticleIntegrator final : public Integrator {
            size_t(p.number("texel_memory") * 0x1p20),
            DirectLight(p.integer("direct")),
            p.on("gather"),
+           p.on("aim"),
            {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
             p.integer("transparent_bounces")},
            p.on("caustics_reflective"),
@@ -80,16 +88,34 @@ class ParticleIntegrator final : public Integrator {
   }
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
-    trace_particles(context, pass);
+    if (pass == 0 && s_.aim) aim(context, film);
+    texels_->clear(context.lights.emitted_power());
+    trace_particles(context, {kParticleStream, uint32_t(pass) * uint32_t(s_.particles), s_.particles}, &ledger_,
+                    learned_from_ > 0 ? &trials_ : nullptr);
     if (context.cancelled) return;
+    if (learned_from_ > 0 && trials_.size() > 2 * learned_from_) learn(std::move(trials_)), trials_.clear();
+    if (learned_from_ > kMostTrials) learned_from_ = 0, texels_->forget_worth();
+    log_ledger(context.log, pass + 1);
     for_each_pixel(context, pass, film,
                    [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) { look(context, film, camera, sampler, result); });
   }
 
  private:
-  void trace_particles(const RenderContext& context, int pass);
-  void trace_particle(const RenderContext& context, uint32_t index, float share, Ledger& ledger);
-  void carry(const RenderContext& context, const EmittedRay& emitted, Particle p, Ledger& ledger);
+  // Particles that start with these numbers.
+  struct Batch {
+    uint32_t stream, first;
+    int count;
+  };
+  void trace_particles(const RenderContext& context, const Batch& all, Ledger* ledger, std::vector<EmissionGuide::Trial>* trials);
+  EmissionGuide::Trial trace_particle(const RenderContext& context, Sampler sampler, float share, Ledger& ledger);
+  double carry(const RenderContext& context, const EmittedRay& emitted, Particle p, Ledger& ledger);
+  void log_ledger(Log& log, int passes) const;
+  void aim(const RenderContext& context, const Film& film);
+  void learn(std::vector<EmissionGuide::Trial> trials) {
+    learned_from_ = std::max(trials.size(), size_t(1));
+    guide_ = EmissionGuide(std::move(trials));
+  }
+  void look_around(const RenderContext& context, const Film& film, int round) const;
   void look(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler, PixelSample& result) const;
   Rgb read(const ShadingPoint& point, const Bsdf& bsdf) const;
 
@@ -108,25 +134,38 @@ class ParticleIntegrator final : public Integrator {
 
   ParticleSettings s_;
   std::unique_ptr<Texels> texels_;
+  EmissionGuide guide_;
+  size_t learned_from_ = 0;                     // trials; 0: no longer learns
+  std::vector<EmissionGuide::Trial> trials_;  // of passes since then
   Ledger ledger_;
 };
 
 // ---------------------------------------------------------------- from the light
 
-void ParticleIntegrator::trace_particles(const RenderContext& context, int pass) {
-  texels_->clear(context.lights.emitted_power());
-  const int batches = (s_.particles + kBatch - 1) / kBatch;
+void ParticleIntegrator::trace_particles(const RenderContext& context, const Batch& all, Ledger* ledger,
+                                         std::vector<EmissionGuide::Trial>* trials) {
+  const int batches = (all.count + kBatch - 1) / kBatch;
   std::vector<Ledger> ledgers{size_t(batches)};
+  std::vector<std::vector<EmissionGuide::Trial>> found{size_t(batches)};
   context.pool.for_each(batches, context.cancelled, [&](int b) {
-    for (int k = b * kBatch; k < std::min((b + 1) * kBatch, s_.particles); ++k)
-      trace_particle(context, uint32_t(pass) * uint32_t(s_.particles) + uint32_t(k), 1.0f / float(s_.particles), ledgers[size_t(b)]);
+    for (int k = b * kBatch; k < std::min((b + 1) * kBatch, all.count); ++k) {
+      const Sampler sampler(context.seed, all.stream, all.first + uint32_t(k));
+      const EmissionGuide::Trial trial = trace_particle(context, sampler, 1.0f / float(all.count), ledgers[size_t(b)]);
+      if (trials && trial.worth > 0.0f) found[size_t(b)].push_back(trial);
+    }
   });
-  for (const Ledger& l : ledgers) ledger_.add(l);
+  if (ledger)
+    for (const Ledger& l : ledgers) ledger->add(l);
+  if (trials)
+    for (const auto& part : found) trials->insert(trials->end(), part.begin(), part.end());
+}
+
+void ParticleIntegrator::log_ledger(Log& log, int passes) const {
   const std::pair<const char*, double> figures[] = {{"emitted power", ledger_.emitted},
                                                     {"absorbed power", ledger_.absorbed},
                                                     {"escaped power", ledger_.escaped},
                                                     {"created power", ledger_.created}};
-  for (const auto& [name, sum_of_passes] : figures) context.log.set(name, sum_of_passes / (pass + 1));
+  for (const auto& [name, sum_of_passes] : figures) log.set(name, sum_of_passes / passes);
 }
 
 // What irradiance as the diffuse lobes see it has more than power per area: they weigh light by their own normals.
@@ -146,20 +185,24 @@ float adjoint_factor(const ShadingPoint& point, const Bsdf& bsdf, Vec3 wi) {
   return geometric > 1e-6f ? shading / geometric : 0.0f;
 }
 
-void ParticleIntegrator::trace_particle(const RenderContext& context, uint32_t index, float share, Ledger& ledger) {
+EmissionGuide::Trial ParticleIntegrator::trace_particle(const RenderContext& context, Sampler sampler, float share, Ledger& ledger) {
+  const float u_choice = sampler.next_1d();
+  const Vec2 u_place = sampler.next_2d(), u_direction = sampler.next_2d();
+  EmissionNumbers u{u_choice, u_place.x, u_place.y, u_direction.x, u_direction.y};
+  const float weight = guide_.warp(u);
+  const auto emitted = context.lights.emit(u[0], {u[1], u[2]}, {u[3], u[4]});
+  if (!emitted) return {u, 0.0f};
   Particle particle;
-  particle.sampler = Sampler(context.seed, kParticleStream, index);
-  const float u_choice = particle.sampler.next_1d();
-  const Vec2 u_place = particle.sampler.next_2d(), u_direction = particle.sampler.next_2d();
-  const auto emitted = context.lights.emit(u_choice, u_place, u_direction);
-  if (!emitted) return;
-  particle.ray = emitted->ray, particle.power = emitted->power * share;
+  particle.sampler = sampler, particle.ray = emitted->ray, particle.power = emitted->power * (share * weight);
   particle.state.kind = kRayDiffuse;
   ledger.emitted += sum(particle.power);
-  carry(context, *emitted, std::move(particle), ledger);
+  const double worth = carry(context, *emitted, std::move(particle), ledger);
+  return {u, float(worth / (double(share) * double(context.lights.emitted_power())))};
 }
 
-void ParticleIntegrator::carry(const RenderContext& context, const EmittedRay& emitted, Particle p, Ledger& ledger) {
+// Returns what the power that it leaves is worth.
+double ParticleIntegrator::carry(const RenderContext& context, const EmittedRay& emitted, Particle p, Ledger& ledger) {
+  double worth = 0;
   Bsdf bsdf;
   for (;; ++p.bounce) {
     p.sampler.jump_to(p.bounce + 1);
@@ -167,7 +210,7 @@ void ParticleIntegrator::carry(const RenderContext& context, const EmittedRay& e
     const auto hit = context.scene.intersect(p.ray, is_direct ? ~0u : uint32_t(kRayDiffuse));
     if (!hit) {
       ledger.escaped += sum(p.power);
-      return;
+      return worth;
     }
     ShadingPoint point = context.scene.shading_point(p.ray, *hit, p.state);
     context.scene.shade(point, bsdf);
@@ -183,7 +226,7 @@ void ParticleIntegrator::carry(const RenderContext& context, const EmittedRay& e
         ++beyond.bounce;
         beyond.ray = {offset_point(point.position, point.ng, p.ray.direction), p.ray.direction};
         ledger.created += sum(p.power);
-        carry(context, emitted, std::move(beyond), ledger);
+        worth += carry(context, emitted, std::move(beyond), ledger);
       }
     }
     if (kinds != kAllLobes) bsdf.choose(kinds, point.wo);
@@ -191,7 +234,7 @@ void ParticleIntegrator::carry(const RenderContext& context, const EmittedRay& e
     // Leave the power, whether the particle goes on or not.
     const bool is_lit = !is_direct || context.lights.turns_to(emitted, point.position);
     if ((bsdf.flags() & kDiffuse) && is_lit && p.bounces.reaches_diffuse(s_.limits) && (!is_direct || direct_in_texels(context)))
-      texels_->deposit(point, point.backfacing, p.power * diffuse_share(point, bsdf));
+      worth += texels_->deposit(point, point.backfacing, p.power * diffuse_share(point, bsdf));
 
     // Go on with the probability of what is left, absorbed otherwise.
     const float u_lobe = p.sampler.next_1d(), u_absorb = p.sampler.next_1d();
@@ -214,6 +257,53 @@ void ParticleIntegrator::carry(const RenderContext& context, const EmittedRay& e
     p.ray = {offset_point(point.position, point.ng, next->wi), next->wi};
   }
   ledger.absorbed += sum(p.power);
+  return worth;
+}
+
+// ---------------------------------------------------------------- where to aim
+
+// Most particles may come to nothing that is seen: those of a sky to all but a room's windows, those of a lamp to all but the room it
+// hangs in. Rounds of particles, thrown away, show which do not; those of passes that follow refine it for passes still to come.
+void ParticleIntegrator::aim(const RenderContext& context, const Film& film) {
+  texels_->clear(context.lights.emitted_power());
+  texels_->watch();
+  std::vector<std::vector<EmissionGuide::Trial>> rounds;
+  while (int(rounds.size()) < kMostRounds) {
+    const int round = int(rounds.size());
+    context.log.stage("aiming particles, round " + std::to_string(round + 1));
+    if (round < kRoundsOfAPass) look_around(context, film, round);
+    texels_->appraise();
+    const int count = std::max(s_.particles / kRoundsOfAPass, kLeastRound);
+    trace_particles(context, {kAimStream, uint32_t(round) * uint32_t(count), count}, nullptr, &rounds.emplace_back());
+    if (context.cancelled) break;
+    // The younger half: the older ones did not know yet what is bright.
+    std::vector<EmissionGuide::Trial> trials;
+    for (size_t r = rounds.size() / 2; r < rounds.size(); ++r) trials.insert(trials.end(), rounds[r].begin(), rounds[r].end());
+    learn(std::move(trials));
+    if (guide_.knowledge() > kWellAimed && round + 1 >= kLeastRounds) break;
+  }
+  texels_->stop_watching();
+  context.log.set("rounds of aim", double(rounds.size()));
+  context.log.stage("");
+}
+
+// Rows of pixels all over the picture.
+void ParticleIntegrator::look_around(const RenderContext& context, const Film& film, int round) const {
+  const FilmSpec& spec = film.spec();
+  const int rows = int(film.tiles().size()) * Film::kTileSize, step = std::max(1, rows * Film::kTileSize / kMostLookers);
+  context.pool.for_each(rows / step, context.cancelled, [&](int k) {
+    const int row = k * step + int(hash32(uint32_t(round)) % uint32_t(step));
+    const Tile& tile = film.tiles()[size_t(row / Film::kTileSize)];
+    const int y = tile.y0 + row % Film::kTileSize;
+    if (y >= tile.y1) return;
+    const CameraRow cameras(context, film, spec.x0 + tile.x0, spec.y0 + y, round);
+    for (int i = 0; i < tile.x1 - tile.x0; ++i) {
+      if (context.lightmap && !context.lightmap->covers(spec.x0 + tile.x0 + i, spec.y0 + y)) continue;
+      Sampler sampler = cameras.samplers.sampler(i);
+      PixelSample unused;
+      look(context, film, cameras.rays[i], sampler, unused);
+    }
+  });
 }
 
 // ---------------------------------------------------------------- from the eye
@@ -262,6 +352,8 @@ const Descriptor& particle_descriptor() {
            "",
            {{"RAYS", "Rays", "Shadow rays: crisp shadows"}, {"TEXELS", "Texels", "The texels, as all other light"}}},
           {"gather", "Final Gather", Kind::kBool, 0, 0, 1, "Texels are read one diffuse bounce later: without their blur, but noisier"},
+          {"aim", "Aim Particles", Kind::kBool, 1, 0, 1,
+           "Learns, before the first pass, which particles come to what is seen, as through a window, and sends more of these"},
           {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
           {"diffuse_bounces", "Diffuse", Kind::kInt, 4, 0, 1024, "Diffuse reflections"},
           {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},

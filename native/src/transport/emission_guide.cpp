@@ -1,62 +1,111 @@
-// Learning where light should start.
+// Building the tree of boxes: where a halving lowers the variance by more than chance would seem to, as decision trees are grown.
 #include "transport/emission_guide.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <span>
+
+#include "core/vec.h"
+
 namespace gi {
+namespace {
 
-EmissionGuide::EmissionGuide(int lights)
-    : choices_(std::clamp(lights, 1, 16)), worth_(size_t(choices_) * (1 + 4 * kBins)), hits_(size_t(choices_)) {}
+constexpr int kBins = 8;          // along each axis that a box is looked at by: what lies in the middle has equal halves
+constexpr double kChance = 3.0;   // gain that as many equal trials might show by chance, times their number
+constexpr double kLeastGain = 1e-4;  // of the whole
+constexpr double kUnseen = 1.0;      // trials
+constexpr int kMostHalvings = 12;    // of one axis
 
-float EmissionGuide::warp(EmissionNumbers& u) const {
-  if (numbers_.empty()) return 1.0f;
-  const bool even = u[0] < kEven;
-  u[0] = std::min(even ? u[0] / kEven : (u[0] - kEven) / (1.0f - kEven), kOneMinusEpsilon);
-  size_t choice;
-  if (even) {
-    choice = size_t(u[0] * float(choices_));
-  } else {
-    choice = choice_.sample(u[0]);
-    u[0] = std::min((float(choice) + u[0]) / float(choices_), kOneMinusEpsilon);
-  }
-  float density = choice_.probability(choice) * float(choices_);
-  for (size_t k = 0; k < 4; ++k) {
-    const Distribution1D& d = numbers_[4 * choice + k];
-    size_t bin;
-    if (even) {
-      bin = size_t(u[k + 1] * kBins);
-    } else {
-      bin = d.sample(u[k + 1]);
-      u[k + 1] = std::min((float(bin) + u[k + 1]) / kBins, kOneMinusEpsilon);
+}  // namespace
+
+// The density of least variance is in proportion to √(mean of f²) [Kahn & Marshall 1953]. Taken here is √(mean of f): the same where
+// particles bring all or nothing, and not led astray by the few that bring much. A box's mass is that times its volume.
+struct EmissionGuide::Builder {
+  std::vector<Node>& nodes;
+  double whole;
+
+  struct Box {
+    EmissionNumbers low{};
+    std::array<int, kEmissionAxes> halvings{};
+    double volume = 1;
+    float size(int axis) const { return std::ldexp(1.0f, -halvings[size_t(axis)]); }
+  };
+
+  void grow(uint32_t index, std::span<Trial> trials, const Box& box, double worth) {
+    nodes[index].mass = std::sqrt(worth * box.volume);
+    double sum = 0, squares = 0, bins[kEmissionAxes][kBins] = {};
+    for (const Trial& t : trials) {
+      sum += double(t.worth), squares += double(t.worth) * double(t.worth);
+      for (int a = 0; a < int(kEmissionAxes); ++a) {
+        const float place = (t.u[size_t(a)] - box.low[size_t(a)]) / box.size(a);
+        bins[a][std::clamp(int(place * kBins), 0, kBins - 1)] += double(t.worth);
+      }
     }
-    density *= d.probability(bin) * kBins;
+    if (!(sum > 0)) return;
+    int best = -1;
+    double most = kChance * squares / (sum * sum);
+    for (int a = 0; a < int(kEmissionAxes); ++a) {
+      if (box.halvings[size_t(a)] == kMostHalvings) continue;
+      double divided = 0;
+      for (const double b : bins[a]) divided += std::sqrt(b / sum / kBins);
+      if (1.0 - divided > most) most = 1.0 - divided, best = a;
+    }
+    if (best < 0 || most * nodes[index].mass < kLeastGain * whole) return;
+
+    Box halves[2] = {box, box};
+    for (Box& h : halves) h.volume *= 0.5, ++h.halvings[size_t(best)];
+    const float middle = halves[1].low[size_t(best)] += halves[1].size(best);
+    const auto second = std::partition(trials.begin(), trials.end(), [&](const Trial& t) { return t.u[size_t(best)] < middle; });
+    // As if each half had one more: few trials do not say that there is nothing where they are not.
+    const double count = sum * sum / squares, below = std::accumulate(bins[best], bins[best] + kBins / 2, 0.0) / sum;
+    const double share = (below * count + kUnseen) / (count + 2.0 * kUnseen);
+    const uint32_t first = uint32_t(nodes.size());
+    nodes.resize(nodes.size() + 2);
+    nodes[index].first = first, nodes[index].axis = best;
+    grow(first, {trials.begin(), second}, halves[0], share * worth);
+    grow(first + 1, {second, trials.end()}, halves[1], (1.0 - share) * worth);
+    nodes[index].mass = nodes[first].mass + nodes[first + 1].mass;
   }
-  return 1.0f / (kEven + (1.0f - kEven) * density);
+
+  // Mixes even numbers in.
+  void share(uint32_t index, double volume, double total) {
+    Node& n = nodes[index];
+    n.mass = (1.0 - double(kEven)) * n.mass / total + double(kEven) * volume;
+    if (n.first == 0) return;
+    for (uint32_t c : {n.first, n.first + 1}) share(c, 0.5 * volume, total);
+    n.lower = float(nodes[n.first].mass / n.mass);
+  }
+};
+
+EmissionGuide::EmissionGuide(std::vector<Trial> trials) {
+  std::erase_if(trials, [](const Trial& t) { return !(t.worth > 0.0f) || !std::isfinite(t.worth); });
+  double sum = 0, squares = 0;
+  for (const Trial& t : trials) sum += double(t.worth), squares += double(t.worth) * double(t.worth);
+  if (!(sum > 0)) return;
+  knowledge_ = sum * sum / squares;
+  nodes_.resize(1);
+  Builder builder{nodes_, std::sqrt(sum)};
+  builder.grow(0, trials, {}, sum);
+  builder.share(0, 1.0, nodes_[0].mass);
 }
 
-void EmissionGuide::learn(const std::vector<Trial>& trials) {
-  for (const Trial& t : trials) {
-    if (!(t.worth > 0.0f) || !std::isfinite(t.worth)) continue;
-    const size_t choice = size_t(t.u[0] * float(choices_));
-    float* row = worth_.data() + choice * (1 + 4 * kBins);
-    row[0] += t.worth, hits_[choice] += 1.0f;
-    for (size_t k = 0; k < 4; ++k) row[1 + k * kBins + size_t(t.u[k + 1] * kBins)] += t.worth;
+float EmissionGuide::warp(EmissionNumbers& u) const {
+  if (nodes_.empty()) return 1.0f;
+  EmissionNumbers low{}, size;
+  size.fill(1.0f);
+  float pdf = 1.0f;
+  for (const Node* n = &nodes_[0]; n->first != 0;) {
+    const size_t a = size_t(n->axis);
+    const bool upper = u[a] >= n->lower;
+    const float share = upper ? 1.0f - n->lower : n->lower;
+    u[a] = std::min((upper ? u[a] - n->lower : u[a]) / share, kOneMinusEpsilon);
+    size[a] *= 0.5f, pdf *= 2.0f * share;
+    if (upper) low[a] += size[a];
+    n = &nodes_[n->first + (upper ? 1 : 0)];
   }
-  std::vector<float> choice;
-  numbers_.clear();
-  for (size_t c = 0; c < size_t(choices_); ++c) {
-    const float* row = worth_.data() + c * (1 + 4 * kBins);
-    // What few trials say is believed the less.
-    constexpr float kBelieved = 64.0f;
-    const float even = row[0] * std::max(0.05f, kBelieved / std::max(hits_[c], 1.0f));
-    choice.push_back(row[0]);
-    for (size_t k = 0; k < 4; ++k) {
-      const float* bins = row + 1 + k * kBins;
-      std::vector<float> smooth(kBins);
-      for (int i = 0; i < kBins; ++i)
-        smooth[size_t(i)] = 0.5f * bins[i] + 0.25f * (bins[std::max(i - 1, 0)] + bins[std::min(i + 1, kBins - 1)]) + even / kBins;
-      numbers_.emplace_back(smooth);
-    }
-  }
-  choice_ = Distribution1D(choice);
+  for (size_t a = 0; a < kEmissionAxes; ++a) u[a] = std::min(low[a] + size[a] * u[a], kOneMinusEpsilon);
+  return 1.0f / pdf;
 }
 
 SeenPoints::SeenPoints(const std::vector<Vec3>& points, ThreadPool& pool) : tree_(points, pool) {

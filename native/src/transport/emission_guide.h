@@ -1,41 +1,43 @@
 // Sends more light where it matters: learns from trial paths which of the random numbers that light starts with lead to what the eye sees,
-// and draws those more often. Nothing is lost: weights make up for it. [Lepage 1978; Peter & Pietrek 1998]
+// and draws those more often: a tree of boxes in their cube. Nothing is lost: weights make up for it. [Peter & Pietrek 1998]
 #pragma once
 #include <array>
-#include <memory>
 #include <vector>
 
-#include "core/distribution.h"
 #include "core/point_tree.h"
 
 namespace gi {
 
 // The random numbers by which light starts, as LightSet::emit takes them: choice, place, direction.
-using EmissionNumbers = std::array<float, 5>;
+constexpr size_t kEmissionAxes = 5;
+using EmissionNumbers = std::array<float, kEmissionAxes>;
 
 class EmissionGuide {
  public:
-  EmissionGuide() = default;  // changes nothing
-  explicit EmissionGuide(int lights);
-
-  // Turns even numbers into ones of the learnt density, and returns 1 / density.
-  float warp(EmissionNumbers& u) const;
-  // What a trial path was worth: an estimate divided by the density it was drawn with.
   struct Trial {
     EmissionNumbers u;
-    float worth;
+    float worth;  // what the path brings, over the density that it was drawn with
   };
-  void learn(const std::vector<Trial>& trials);
+
+  EmissionGuide() = default;  // changes nothing
+  explicit EmissionGuide(std::vector<Trial> trials);
+
+  // Turns even numbers into ones of the learnt density, and returns 1 / density. That is never below kEven: nothing is ruled out.
+  float warp(EmissionNumbers& u) const;
+  static constexpr float kEven = 0.15f;
+
+  double knowledge() const { return knowledge_; }  // how many equal trials would tell as much
 
  private:
-  static constexpr int kBins = 32;
-  static constexpr float kEven = 0.2f;  // share of paths that start as if nothing had been learnt
-
-  int choices_ = 0;
-  std::vector<float> worth_;  // per choice: kBins for each of the other four numbers, and in front its sum
-  std::vector<float> hits_;   // per choice: trials that were worth anything
-  Distribution1D choice_;
-  std::vector<Distribution1D> numbers_;  // four per choice
+  struct Node {
+    uint32_t first = 0;  // of two children; 0: none
+    int axis = 0;        // that they halve
+    double mass = 0;
+    float lower = 0.5f;  // the first child's share
+  };
+  struct Builder;
+  std::vector<Node> nodes_;
+  double knowledge_ = 0;
 };
 
 // What the eye sees by way of anything but diffuse surfaces: points on diffuse ones, and how far apart they are.

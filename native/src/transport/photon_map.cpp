@@ -153,7 +153,8 @@ SeenPoints find_seen(const RenderContext& context, const Film& film, const Bounc
 
 EmissionGuide learn_emission(const RenderContext& context, SubpathSettings settings, int photons, uint8_t classes, const SeenPoints& seen) {
   constexpr int kRounds = 3;
-  EmissionGuide guide(int(context.lights.count()));
+  EmissionGuide guide;
+  std::vector<EmissionGuide::Trial> trials;
   const int count = std::clamp(photons / 8, 1000, 40000);
   for (int round = 0; round < kRounds && !context.cancelled; ++round) {
     settings.guide = &guide;
@@ -169,11 +170,8 @@ EmissionGuide learn_emission(const RenderContext& context, SubpathSettings setti
           }
           if (worth > 0.0f) trials.push_back({path.start, worth});
         });
-    EmissionGuide next = guide;
-    std::vector<EmissionGuide::Trial> trials;
     for (const auto& part : found) trials.insert(trials.end(), part.begin(), part.end());
-    next.learn(trials);
-    guide = next;
+    guide = EmissionGuide(trials);
   }
   return guide;
 }

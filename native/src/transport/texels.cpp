@@ -19,6 +19,8 @@ constexpr double kCoarser = 1.189207115;  // fourth root of 2: steps in which te
 constexpr double kMostCells = 1e7;        // that are looked at for what stands on them
 constexpr double kMostSightRays = 1e7;    // spent on the areas of those that something does stand on
 constexpr double kHidden = 0.02;          // share of a hat below which it counts as hidden
+constexpr float kReaderParts = 64.0f;     // readers are counted in these
+constexpr double kDarkest = 0.1;          // of the mean density that is read: darker nodes count as if they were this bright
 constexpr uint32_t kSightMask = kRayDiffuse;
 
 // The factor by which a transform scales lengths; 0 if not the same in all directions.
@@ -254,7 +256,7 @@ void Texels::clear(double largest) {
     }
 }
 
-void Texels::deposit(const ShadingPoint& point, bool back, Rgb power) {
+double Texels::deposit(const ShadingPoint& point, bool back, Rgb power) {
   Place& place = places_[point.instance];
   Side& side = place.side[back];
   side.touched.store(true, std::memory_order_relaxed);
@@ -266,34 +268,67 @@ void Texels::deposit(const ShadingPoint& point, bool back, Rgb power) {
     if (cell.weight[k] > 0.0f) place.lattice->add_nodes(cell, k, cell.weight[k], choice, nodes);
   // Whole numbers: their sum does not depend on the order.
   constexpr double kMost = 0x1p61;
-  for (int k = 0; k < nodes.count; ++k)
+  double worth = 0;
+  for (int k = 0; k < nodes.count; ++k) {
     for (int c = 0; c < 3; ++c) {
       const double counts = std::min(double(power[c]) * double(nodes.weight[k]) / unit_, kMost);
       if (counts >= 1.0) side.sums[nodes.node[k]].channel[c].fetch_add(int64_t(counts), std::memory_order_relaxed);
     }
+    if (!worth_.empty()) worth += double(average(power) * nodes.weight[k]) * double(worth_[index_of(side, nodes.node[k])]);
+  }
+  return worth;
+}
+
+double Texels::area(const Place& place, bool back, uint32_t node) const {
+  const std::vector<float>& own = place.side[back].area;
+  return own.empty() ? double(place.lattice->area()[node]) * double(place.area_scale) : double(own[node]);
 }
 
 Rgb Texels::density(const ShadingPoint& point, bool back) const {
   const Place& place = places_[point.instance];
   const Side& side = place.side[back];
-  if (!side.touched) return Rgb();
+  if (!side.touched && !readers_) return Rgb();
   const LatticeCell cell = cell_of(point, back);
-  const bool own = !side.area.empty();
-  const std::vector<float>& area = own ? side.area : place.lattice->area();
-  const double unit = own ? unit_ : unit_ / double(place.area_scale);
   double sum[3] = {0, 0, 0}, used = 0;
   for (int k = 0; k < 3; ++k) {
     if (!(cell.weight[k] > 0.0f)) continue;
     place.lattice->for_each_node(cell, k, cell.weight[k], [&](uint32_t node, float w) {
-      if (!(area[node] > 0.0f)) return;
+      const double covered = area(place, back, node);
+      if (!(covered > 0)) return;
       used += double(w);
-      for (int c = 0; c < 3; ++c)
-        sum[c] += double(side.sums[node].channel[c].load(std::memory_order_relaxed)) * double(w) / double(area[node]);
+      if (readers_) readers_[index_of(side, node)].fetch_add(uint32_t(w * kReaderParts), std::memory_order_relaxed);
+      for (int c = 0; c < 3; ++c) sum[c] += double(side.sums[node].channel[c].load(std::memory_order_relaxed)) * double(w) / covered;
     });
   }
   if (!(used > 0)) return Rgb();
-  const double scale = unit / used;
+  const double scale = unit_ / used;
   return {float(sum[0] * scale), float(sum[1] * scale), float(sum[2] * scale)};
+}
+
+// ---------------------------------------------------------------- what is read
+
+void Texels::watch() { readers_ = std::make_unique<std::atomic<uint32_t>[]>(node_count()); }
+
+void Texels::appraise() {
+  worth_.resize(node_count());
+  const auto for_each_read = [&](const auto& f) {
+    for (const Place& place : places_)
+      for (const bool back : {false, true})
+        for (uint32_t n = 0; n < place.lattice->node_count(); ++n) {
+          const size_t i = index_of(place.side[back], n);
+          const double readers = double(readers_[i].load(std::memory_order_relaxed)), covered = area(place, back, n);
+          if (!(readers > 0)) continue;
+          double sum = 0;
+          for (const auto& c : sums_.get()[i].channel) sum += double(c.load(std::memory_order_relaxed));
+          f(i, readers, covered, unit_ * sum / 3.0 / covered);
+        }
+  };
+  double readers = 0, mean = 0;
+  for_each_read([&](size_t, double n, double, double density) { readers += n, mean += n * density; });
+  for_each_read([&](size_t i, double n, double covered, double density) {
+    const double brightness = mean > 0 ? std::max(density * readers / mean, kDarkest) : 1.0;
+    worth_[i] = float(n / readers / (covered * brightness));
+  });
 }
 
 // ---------------------------------------------------------------- what there is

@@ -21,8 +21,16 @@ class Texels {
   // Forgets what was gathered. `largest`: a power that no deposit and no sum of a node will be far above.
   void clear(double largest);
   // Any thread. `back`: the side that the triangle's normal points away from. The share of each node near the point is by its hat.
-  void deposit(const ShadingPoint& point, bool back, Rgb power);
+  // Returns what the power is worth to those who read; 0 before `appraise`.
+  double deposit(const ShadingPoint& point, bool back, Rgb power);
   Rgb density(const ShadingPoint& point, bool back) const;  // per square metre
+
+  // Learning where power is wanted. From `watch` on, density() counts how often each node is read. `appraise`: from what was read and
+  // gathered until now, deposit() knows Σ readers · density that it adds / the node's, times a constant.
+  void watch();
+  void appraise();
+  void stop_watching() { readers_.reset(); }
+  void forget_worth() { std::vector<float>().swap(worth_); }
 
   double size() const { return size_; }
   size_t node_count() const;
@@ -56,6 +64,8 @@ class Texels {
   void measure_split(uint32_t instance, bool back, uint32_t triangle, uint32_t cell, int samples,
                      std::vector<std::pair<uint32_t, double>>& changes) const;
   LatticeCell cell_of(const ShadingPoint& point, bool back) const;
+  double area(const Place& place, bool back, uint32_t node) const;
+  size_t index_of(const Side& side, uint32_t node) const { return size_t(side.sums - sums_.get()) + node; }
   void weigh_by_sight(uint32_t instance, bool back, Vec3 position, LatticeCell& cell) const;
 
   const Scene& scene_;
@@ -63,6 +73,8 @@ class Texels {
   std::vector<Place> places_;
   std::unique_ptr<Sum, void (*)(void*)> sums_;
   double unit_ = 0;  // power of one count
+  std::unique_ptr<std::atomic<uint32_t>[]> readers_;  // of every node, while watched
+  std::vector<float> worth_;                          // of a watt in every node, once appraised
   size_t splits_ = 0;
   bool split_all_ = true;
 };
