@@ -134,11 +134,11 @@ def picture(scene, size, **parameters):
     return shoot(scene, (0, 0, 0.9), (0, 0, -1), 8, size, 1.8, particles=200000, **parameters)[0]
 
 
-def test_no_seams_and_no_leaks():
+@pytest.mark.parametrize(("n", "foot"), [(7, 0.03), (8, 0.0), (8, 1e-3), (16, 0.25)])
+def test_no_seams_and_no_leaks(n, foot):
     """One floor of many triangles, a wall of no thickness across it, light on one side: as one floor of two triangles, and dark
-    behind the wall, wherever its foot crosses the texels."""
-    n = 7
-    wall = quad((0.03, -1, 0), (0.03, 1, 0), (0.03, 1, 1), (0.03, -1, 1))
+    behind the wall, wherever its foot crosses the texels or stands on their rows."""
+    wall = quad((foot, -1, 0), (foot, 1, 0), (foot, 1, 1), (foot, -1, 1))
     x, y = np.meshgrid(np.linspace(-1, 1, n + 1), np.linspace(-1, 1, n + 1))
     corners = np.stack([x, y, 0 * x], -1).reshape(-1, 3)
     faces = [(k, k + 1, k + n + 2, k + n + 1) for k in (i * (n + 1) + j for i in range(n) for j in range(n))]
@@ -148,11 +148,11 @@ def test_no_seams_and_no_leaks():
     for floor in (mesh(corners, faces), whole):
         scene = scene_of((floor, surface(0.8)), (wall, surface(0.0)), lights=[beam])
         found.append(picture(scene, 36, direct="TEXELS", texel_size=0.15))
-    lit = found[0] > 0
-    assert lit[:, :18].all()  # up to the wall
+    pixels = int((foot + 0.9) / 0.05 + 1e-3)  # up to the wall
     for image in found:
-        assert image[:, 20:].max() < 1e-3 * image.max()
-    ratio = found[0][:, :17] / found[1][:, :17]
+        assert (image[:, :pixels] > 0).all()
+        assert image[:, pixels + 2 :].max() < 1e-3 * image.max()
+    ratio = found[0][:, : pixels - 1] / found[1][:, : pixels - 1]
     assert abs(ratio.mean() - 1) < 0.02
     assert ratio.std() < 0.1
 

@@ -13,7 +13,7 @@ constexpr int kRoundsOfAPass = 8;      // a round, to learn where to aim, has th
 constexpr int kLeastRound = 1 << 12;   // but no fewer than these
 constexpr int kLeastRounds = 3, kMostRounds = 24;
 constexpr size_t kMostTrials = 1 << 19;  // that a guide is made of, about
-constexpr double kWellAimed = 5000;    // particles' worth of knowledge that ends the learning
+constexpr size_t kWellAimed = 20000;      // trials that brought something end the learning before the first pass
 constexpr int kMostLookers = 1 << 14;  // paths from the eye that show what is seen
 constexpr uint8_t kAllLobes = kDiffuse | kGlossy | kSpecular | kTransparent;
 constexpr uint32_t kMostLayers = 64;  // that light without shadows passes
@@ -280,7 +280,7 @@ void ParticleIntegrator::aim(const RenderContext& context, const Film& film) {
     std::vector<EmissionGuide::Trial> trials;
     for (size_t r = rounds.size() / 2; r < rounds.size(); ++r) trials.insert(trials.end(), rounds[r].begin(), rounds[r].end());
     learn(std::move(trials));
-    if (guide_.knowledge() > kWellAimed && round + 1 >= kLeastRounds) break;
+    if (learned_from_ > kWellAimed && round + 1 >= kLeastRounds) break;
   }
   texels_->stop_watching();
   context.log.set("rounds of aim", double(rounds.size()));

@@ -80,10 +80,9 @@ struct EmissionGuide::Builder {
 
 EmissionGuide::EmissionGuide(std::vector<Trial> trials) {
   std::erase_if(trials, [](const Trial& t) { return !(t.worth > 0.0f) || !std::isfinite(t.worth); });
-  double sum = 0, squares = 0;
-  for (const Trial& t : trials) sum += double(t.worth), squares += double(t.worth) * double(t.worth);
+  double sum = 0;
+  for (const Trial& t : trials) sum += double(t.worth);
   if (!(sum > 0)) return;
-  knowledge_ = sum * sum / squares;
   nodes_.resize(1);
   Builder builder{nodes_, std::sqrt(sum)};
   builder.grow(0, trials, {}, sum);

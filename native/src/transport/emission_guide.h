@@ -26,8 +26,6 @@ class EmissionGuide {
   float warp(EmissionNumbers& u) const;
   static constexpr float kEven = 0.15f;
 
-  double knowledge() const { return knowledge_; }  // how many equal trials would tell as much
-
  private:
   struct Node {
     uint32_t first = 0;  // of two children; 0: none
@@ -37,7 +35,6 @@ class EmissionGuide {
   };
   struct Builder;
   std::vector<Node> nodes_;
-  double knowledge_ = 0;
 };
 
 // What the eye sees by way of anything but diffuse surfaces: points on diffuse ones, and how far apart they are.

@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kMaxLevel = 11;
 constexpr float kSameNormal = 0.9995f;   // cosine: 1.8 degrees
+constexpr float kFlat = 0.95f;           // cosine between faces that go on in one plane
 constexpr float kSharpest = 0.2f;        // cosine between faces that smooth shading joins
 constexpr float kLongest = 16.0f;        // aspect of a triangle beyond which its small ones become longer than wished
 constexpr double kSmall = 0.5;           // of the wished size: triangles below are merged
@@ -128,6 +129,7 @@ struct TexelLattice::Builder {
           Triangle& theirs = out.triangles_[u];
           mine.edge_level[k] = theirs.edge_level[m] = std::min(mine.level, theirs.level);
           mine.reversed[k] = false, theirs.reversed[m] = true;
+          if (dot(faces[t].ng, faces[u].ng) > kFlat) mine.continues |= uint8_t(1u << k), theirs.continues |= uint8_t(1u << m);
           mine.edge[k] = theirs.edge[m] = nodes;
           nodes += (1u << mine.edge_level[k]) - 1;
           corners.join(3 * t + k, 3 * u + (m + 1) % 3);

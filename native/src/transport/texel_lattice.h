@@ -40,6 +40,7 @@ class TexelLattice {
   static double estimate_nodes(const Scene& scene, uint32_t instance, double size);
 
   uint32_t node_count() const { return uint32_t(area_.size()); }
+  uint32_t triangle_count() const { return uint32_t(triangles_.size()); }
   uint32_t cell_count() const { return cells_; }
   // ∫ of the node's hat over the surface, m².
   const std::vector<float>& area() const { return area_; }
@@ -52,6 +53,7 @@ class TexelLattice {
     return t.level == 0 && (t.corner[0] & t.corner[1] & t.corner[2] & kMerged);
   }
   int level(uint32_t triangle) const { return triangles_[triangle].level; }  // log2 of the small triangles along an edge
+  bool continues(uint32_t triangle, int edge) const { return triangles_[triangle].continues >> edge & 1; }  // of 01, 12, 20
   // The k-th small triangle of a triangle, with the weights of its middle.
   LatticeCell cell(uint32_t triangle, uint32_t k) const;
   // The node, or nodes, that a corner of the cell belongs to, times `weight`. `choice`: a number in [0, 1) that picks one of the
@@ -74,6 +76,7 @@ class TexelLattice {
     uint8_t level;           // log2 of the small triangles along an edge
     uint8_t edge_level[3];   // never more: the coarser neighbour's
     bool reversed[3];        // the edge's nodes are counted from its other end
+    uint8_t continues;       // bit of each edge beyond which the same surface lies in the same plane, about
   };
   struct Corner {
     uint32_t id;

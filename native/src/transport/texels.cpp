@@ -7,6 +7,7 @@
 #include <map>
 #include <new>
 #include <numeric>
+#include <set>
 
 #include "core/check.h"
 #include "core/sampler.h"
@@ -60,6 +61,11 @@ struct SightCell {
     middle = (corner[0] + corner[1] + corner[2]) / 3.0f;
   }
   Vec3 inside(size_t k) const { return lerp(corner[k], middle, 0.03f); }
+  // Near a corner, but beyond the edge between two.
+  Vec3 beyond(size_t k, size_t from, size_t to) const {
+    const Vec3 edge = normalize(corner[to] - corner[from]), in = inside(k) - corner[k];
+    return corner[k] + edge * (2.0f * dot(in, edge)) - in;
+  }
   bool sees(const Scene& scene, Vec3 a, Vec3 b) const {
     const Vec3 from = a + up, to = b + up;
     const float distance = length(to - from);
@@ -127,7 +133,7 @@ void Texels::find_splits(ThreadPool& pool, const std::atomic<bool>& cancelled) {
   struct Task {
     uint32_t instance, first, last;
     bool back;
-    std::vector<uint32_t> found{};  // triangle, cell
+    Splits found{};
   };
   std::vector<Task> tasks;
   double cells = 0;
@@ -146,7 +152,7 @@ void Texels::find_splits(ThreadPool& pool, const std::atomic<bool>& cancelled) {
     Task& task = tasks[size_t(k)];
     for (uint32_t t = task.first; t < task.last; ++t) test_triangle(task.instance, t, task.back, task.found);
   });
-  for (const Task& task : tasks) splits_ += task.found.size() / 2;
+  for (const Task& task : tasks) splits_ += task.found.cells.size() / 2;
   if (splits_ == 0 || cancelled) return;
 
   // The areas that are left of the hats, by testing points of each split small triangle.
@@ -156,10 +162,13 @@ void Texels::find_splits(ThreadPool& pool, const std::atomic<bool>& cancelled) {
     const uint32_t i = tasks[begin].instance;
     Place& place = places_[i];
     std::vector<uint32_t> all;
-    for (size_t k = begin; k < end; ++k) all.insert(all.end(), tasks[k].found.begin(), tasks[k].found.end());
+    for (size_t k = begin; k < end; ++k) all.insert(all.end(), tasks[k].found.cells.begin(), tasks[k].found.cells.end());
     if (all.empty()) continue;
     Side& side = place.side[tasks[begin].back];
     side.split.assign(place.lattice->cell_count() / 32 + 1, 0u);
+    for (size_t k = begin; k < end; ++k)
+      for (const uint32_t node : tasks[k].found.walled) side.walled.resize(place.lattice->node_count()), side.walled[node] = true;
+    add_walled(*place.lattice, side, all);
     std::vector<double> area(place.lattice->area().begin(), place.lattice->area().end());
     for (double& a : area) a *= double(place.area_scale);
     for (size_t k = 0; k < all.size(); k += 2) {
@@ -183,7 +192,7 @@ void Texels::find_splits(ThreadPool& pool, const std::atomic<bool>& cancelled) {
   }
 }
 
-void Texels::test_triangle(uint32_t instance, uint32_t triangle, bool back, std::vector<uint32_t>& found) const {
+void Texels::test_triangle(uint32_t instance, uint32_t triangle, bool back, Splits& found) const {
   const TexelLattice& lattice = *places_[instance].lattice;
   if (lattice.is_merged(triangle)) return;
   // Every edge between lattice points belongs to one upright small triangle: (i, j) of row j. Those of a row alternate with the
@@ -193,16 +202,45 @@ void Texels::test_triangle(uint32_t instance, uint32_t triangle, bool back, std:
   std::vector<bool> split(size_t(n) * n, false);
   for (uint32_t j = 0; j < n; ++j)
     for (uint32_t i = 0; i + j < n; ++i) {
-      const SightCell s(scene_, instance, lattice.cell(triangle, index(i, j, true)), back);
-      const auto cut = [&](size_t from, size_t to) { return !s.sees(scene_, s.inside(from), s.inside(to)); };
-      const bool below = cut(0, 1), beyond = cut(1, 2), left = cut(2, 0);
+      const LatticeCell cell = lattice.cell(triangle, index(i, j, true));
+      const SightCell s(scene_, instance, cell, back);
+      // From one end to the other and, where the surface goes on, over to the edge's other side: a wall may stand on the edge itself.
+      const auto cut = [&](size_t from, size_t to, bool goes_on) {
+        if (s.sees(scene_, s.inside(from), goes_on ? s.beyond(to, from, to) : s.inside(to))) return false;
+        if (goes_on && s.sees(scene_, s.inside(from), s.inside(to)) && s.sees(scene_, s.beyond(from, from, to), s.beyond(to, from, to)))
+          for (const size_t end : {from, to})
+            lattice.for_each_node(cell, int(end), 1.0f, [&](uint32_t node, float) { found.walled.push_back(node); });
+        return true;
+      };
+      const bool below = cut(0, 1, j > 0 || lattice.continues(triangle, 0)), left = cut(2, 0, i > 0 || lattice.continues(triangle, 2)),
+                 beyond = cut(1, 2, i + j + 1 < n || lattice.continues(triangle, 1));
       if (below || beyond || left) split[index(i, j, true)] = true;
       if (below && j > 0) split[index(i, j - 1, false)] = true;
       if (left && i > 0) split[index(i - 1, j, false)] = true;
       if (beyond && i + j + 1 < n) split[index(i, j, false)] = true;
     }
   for (uint32_t k = 0; k < n * n; ++k)
-    if (split[k]) found.push_back(triangle), found.push_back(k);
+    if (split[k]) found.cells.push_back(triangle), found.cells.push_back(k);
+}
+
+// All small triangles at such nodes, as far as they are not among `cells`.
+void Texels::add_walled(const TexelLattice& lattice, Side& side, std::vector<uint32_t>& cells) const {
+  if (side.walled.empty()) return;
+  std::set<std::pair<uint32_t, uint32_t>> known;
+  for (size_t k = 0; k < cells.size(); k += 2) known.emplace(cells[k], cells[k + 1]);
+  for (uint32_t t = 0; t < lattice.triangle_count(); ++t)
+    for (uint32_t k = 0; !lattice.is_merged(t) && k < 1u << (2 * lattice.level(t)); ++k) {
+      const LatticeCell cell = lattice.cell(t, k);
+      if ((is_walled(side, lattice, cell, 0) || is_walled(side, lattice, cell, 1) || is_walled(side, lattice, cell, 2)) &&
+          known.emplace(t, k).second)
+        cells.push_back(t), cells.push_back(k);
+    }
+}
+
+bool Texels::is_walled(const Side& side, const TexelLattice& lattice, const LatticeCell& cell, int corner) {
+  bool walled = false;
+  lattice.for_each_node(cell, corner, 1.0f, [&](uint32_t node, float w) { walled = walled || (w > 0.0f && side.walled[node]); });
+  return walled;
 }
 
 void Texels::measure_split(uint32_t instance, bool back, uint32_t triangle, uint32_t k, int samples,
@@ -230,10 +268,17 @@ void Texels::measure_split(uint32_t instance, bool back, uint32_t triangle, uint
 
 void Texels::weigh_by_sight(uint32_t instance, bool back, Vec3 position, LatticeCell& cell) const {
   const SightCell s(scene_, instance, cell, back);
-  float seen[3], sum = 0;
-  for (size_t k = 0; k < 3; ++k) sum += seen[k] = s.sees(scene_, position, s.inside(k)) ? cell.weight[k] : 0.0f;
-  if (!(sum > 1e-4f)) return;
-  for (int k = 0; k < 3; ++k) cell.weight[k] = seen[k] / sum;
+  const Side& side = places_[instance].side[back];
+  // A node on a wall belongs to neither side, unless a point has no other.
+  float seen[3], off_walls[3], sum = 0, sum_off_walls = 0;
+  for (size_t k = 0; k < 3; ++k) {
+    sum += seen[k] = s.sees(scene_, position, s.inside(k)) ? cell.weight[k] : 0.0f;
+    const bool walled = !side.walled.empty() && is_walled(side, *places_[instance].lattice, cell, int(k));
+    sum_off_walls += off_walls[k] = walled ? 0.0f : seen[k];
+  }
+  const bool off = sum_off_walls > 1e-4f;
+  if (!off && !(sum > 1e-4f)) return;
+  for (int k = 0; k < 3; ++k) cell.weight[k] = off ? off_walls[k] / sum_off_walls : seen[k] / sum;
 }
 
 // ---------------------------------------------------------------- sums

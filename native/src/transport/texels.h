@@ -47,9 +47,10 @@ class Texels {
     // if there are none, and then `area` is, too.
     std::vector<uint32_t> split;
     std::vector<float> area;
+    std::vector<bool> walled;  // nodes that a wall stands on: they would belong to both of its sides
     std::atomic<bool> touched{false};
     Side() = default;
-    Side(Side&& o) noexcept : sums(o.sums), split(std::move(o.split)), area(std::move(o.area)) {}
+    Side(Side&& o) noexcept : sums(o.sums), split(std::move(o.split)), area(std::move(o.area)), walled(std::move(o.walled)) {}
   };
   struct Place {
     std::shared_ptr<const TexelLattice> lattice;
@@ -60,7 +61,13 @@ class Texels {
   double bytes_at(double size) const;
   void place_lattices();
   void find_splits(ThreadPool& pool, const std::atomic<bool>& cancelled);
-  void test_triangle(uint32_t instance, uint32_t triangle, bool back, std::vector<uint32_t>& found) const;
+  struct Splits {
+    std::vector<uint32_t> cells;   // triangle, small triangle
+    std::vector<uint32_t> walled;  // nodes
+  };
+  void test_triangle(uint32_t instance, uint32_t triangle, bool back, Splits& found) const;
+  static bool is_walled(const Side& side, const TexelLattice& lattice, const LatticeCell& cell, int corner);
+  void add_walled(const TexelLattice& lattice, Side& side, std::vector<uint32_t>& cells) const;
   void measure_split(uint32_t instance, bool back, uint32_t triangle, uint32_t cell, int samples,
                      std::vector<std::pair<uint32_t, double>>& changes) const;
   LatticeCell cell_of(const ShadingPoint& point, bool back) const;
