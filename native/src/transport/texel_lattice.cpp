@@ -13,10 +13,10 @@ namespace {
 
 constexpr int kMaxLevel = 11;
 constexpr float kSameNormal = 0.9995f;   // cosine: 1.8 degrees
-constexpr float kFlat = 0.95f;           // cosine between faces that go on in one plane
-constexpr float kSharpest = 0.2f;        // cosine between faces that smooth shading joins
-constexpr float kLongest = 16.0f;        // aspect of a triangle beyond which its small ones become longer than wished
-constexpr double kSmall = 0.5;           // of the wished size: triangles below are merged
+constexpr float kFlat = 0.9995f;         // cosine between faces that go on in one plane
+constexpr float kSharpest = 0.2f;  // cosine between faces that smooth shading joins
+constexpr float kLongest = 16.0f;  // aspect of a triangle beyond which its small ones become longer than wished
+constexpr double kSmall = 0.5;  // of the wished size: triangles below are merged
 
 int level_of(const Vec3 v[3], double size) {
   const float a = length_squared(v[1] - v[0]), b = length_squared(v[2] - v[1]), c = length_squared(v[0] - v[2]);
@@ -91,6 +91,14 @@ struct TexelLattice::Builder {
     return dot(f.n[a], g.n[b1]) > kSameNormal && dot(f.n[a1], g.n[b]) > kSameNormal;
   }
 
+  // Whether triangle u is in the plane of t, and where t's small triangles would be if they went on beyond the edge.
+  bool goes_on(uint32_t t, int a, uint32_t u, int b) const {
+    const Face &f = faces[t], &g = faces[u];
+    if (!(dot(f.ng, g.ng) > kFlat)) return false;
+    const Vec3 from = f.v[a], to = f.v[(a + 1) % 3], far = g.v[(b + 2) % 3], middle = from + to - (from + to + f.v[(a + 2) % 3]) / 3.0f;
+    return dot(cross(far - from, middle - from), f.ng) > 0.0f && dot(cross(to - far, middle - far), f.ng) > 0.0f;
+  }
+
   // Edges: pairs of smooth neighbours share nodes, as many as the coarser of them has.
   void join_edges() {
     std::unordered_map<std::array<uint32_t, 3>, uint32_t, Hash> place;  // corners in the same place are one
@@ -129,7 +137,8 @@ struct TexelLattice::Builder {
           Triangle& theirs = out.triangles_[u];
           mine.edge_level[k] = theirs.edge_level[m] = std::min(mine.level, theirs.level);
           mine.reversed[k] = false, theirs.reversed[m] = true;
-          if (dot(faces[t].ng, faces[u].ng) > kFlat) mine.continues |= uint8_t(1u << k), theirs.continues |= uint8_t(1u << m);
+          if (goes_on(t, int(k), u, int(m))) mine.continues |= uint8_t(1u << k);
+          if (goes_on(u, int(m), t, int(k))) theirs.continues |= uint8_t(1u << m);
           mine.edge[k] = theirs.edge[m] = nodes;
           nodes += (1u << mine.edge_level[k]) - 1;
           corners.join(3 * t + k, 3 * u + (m + 1) % 3);

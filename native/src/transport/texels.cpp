@@ -61,11 +61,8 @@ struct SightCell {
     middle = (corner[0] + corner[1] + corner[2]) / 3.0f;
   }
   Vec3 inside(size_t k) const { return lerp(corner[k], middle, 0.03f); }
-  // Near a corner, but beyond the edge between two.
-  Vec3 beyond(size_t k, size_t from, size_t to) const {
-    const Vec3 edge = normalize(corner[to] - corner[from]), in = inside(k) - corner[k];
-    return corner[k] + edge * (2.0f * dot(in, edge)) - in;
-  }
+  // Near a corner, in the small triangle beyond the edge between two.
+  Vec3 beyond(size_t k, size_t from, size_t to) const { return lerp(corner[k], corner[from] + corner[to] - middle, 0.03f); }
   bool sees(const Scene& scene, Vec3 a, Vec3 b) const {
     const Vec3 from = a + up, to = b + up;
     const float distance = length(to - from);
