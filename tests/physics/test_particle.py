@@ -183,3 +183,17 @@ def test_memory_bounds_the_texels():
     sizes = [float(text.split("about ")[1].split(" m")[0]) for text in told]
     assert sizes[1] == pytest.approx(0.004)
     assert sizes[0] > 2 * sizes[1]
+
+
+def test_luminaires_that_send_nothing_are_named():
+    scene = room()
+    scene.programs[1] = surface(0.4, 2.0, name="Embers")
+    scene.programs[1].emission_sampling = "NONE"
+    scene.programs.append(surface(glow=1.0, name="Sky"))
+    scene.world = sd.World(program=len(scene.programs) - 1, sampled=False)
+    scene.film = sd.Film(4, 4)
+    scene.camera = sd.Camera("camera", "ORTHO", looking((0, 0, 0.9), (0, 0, -1)), (-1, 1, -1, 1), 0.0, 1e6)
+    with Session(scene, sd.Settings("particle", 1, parameters={"particles": 100})) as session:
+        while not session.wait():
+            pass
+        assert any(m.endswith(": material 'Embers', the world") for m in session.native.messages())

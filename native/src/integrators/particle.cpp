@@ -85,6 +85,8 @@ class ParticleIntegrator final : public Integrator {
   void prepare(const RenderContext& context) override {
     texels_ = std::make_unique<Texels>(context.scene, s_.texel_size, s_.texel_memory, context.pool, context.cancelled);
     context.log.say(texels_->description());
+    if (const std::string dark = context.lights.unsampled(); !dark.empty())
+      context.log.say("set not to be sampled as lights, so they send no particles and light no surface but are seen themselves: " + dark);
   }
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {

@@ -1,6 +1,7 @@
 // The lights of a scene: what they are asked for, one by one and as a whole. What they are made of is in light_set.h.
 #include "lights/light_set.h"
 
+#include <set>
 #include <thread>
 
 namespace gi {
@@ -94,6 +95,21 @@ std::string LightSet::description() const {
   return std::to_string(impl_->lamps.size()) + " lamps, " + std::to_string(impl_->triangles.size()) + " emissive triangles, " +
          (impl_->world.emits() ? impl_->world.map_width() ? "world map " + std::to_string(impl_->world.map_width()) : "uniform world"
                                : "no world");
+}
+
+std::string LightSet::unsampled() const {
+  const Scene& scene = impl_->scene;
+  std::set<std::string> names;
+  const auto shines = [&](int32_t material) { return material >= 0 && scene.material(material).program.has_emission(); };
+  for (const Instance& i : scene.instances())
+    for (const int32_t m : i.data->materials)
+      if (shines(m) && scene.material(m).emission_sampling == EmissionSampling::kNone)
+        names.insert("material '" + scene.material(m).program.name() + "'");
+  const WorldData& world = scene.data().world;
+  if (!world.sampled && shines(world.program)) names.insert("the world");
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
 }
 
 }  // namespace gi

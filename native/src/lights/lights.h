@@ -94,6 +94,8 @@ class LightSet {
   uint32_t world_light() const;
   float emitted_power() const;  // of everything, about, |luminance|
   std::string description() const;  // how many of what
+  // Materials and the world that shine but are set not to be sampled: found by rays alone, they send nothing. Empty: none.
+  std::string unsampled() const;
 
  private:
   struct Impl;
