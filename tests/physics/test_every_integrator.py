@@ -74,11 +74,11 @@ def test_integrating_sphere(integrator):
     assert error < 0.03
 
 
-def session_of(integrator: str, samples: int, pixels: int, passes=("Combined",), **wishes):
+def session_of(integrator: str, samples: int, pixels: int, passes=("Combined",), threads=2, **wishes):
     scene = room()
     scene.camera = sd.Camera("camera", "ORTHO", looking((0, 0, 2), (0, 0.1, -1)), (-1.5, 1.5, -1.5, 1.5), 0.0, 1e6)
     scene.film = sd.Film(pixels, pixels, filter="BOX", filter_width=1.0, passes=list(passes))
-    return Session(scene, sd.Settings(integrator, samples, threads=2, parameters=parameters(integrator, wishes)))
+    return Session(scene, sd.Settings(integrator, samples, threads=threads, parameters=parameters(integrator, wishes)))
 
 
 @every
@@ -106,6 +106,17 @@ def test_sessions_leave_no_memory_behind(integrator):
                 pass
         found.append(resident())
     assert found[-1] - found[5] < 20, found
+
+
+def test_no_thread_works_on_after_a_render_by_one():
+    """TBB, limited to one thread, leaves one that asks for work for ever."""
+    for _ in range(3):
+        with session_of("path", 1, 8, threads=1) as session:
+            while not session.wait():
+                pass
+    before = time.process_time()
+    time.sleep(0.5)
+    assert time.process_time() - before < 0.1
 
 
 @every

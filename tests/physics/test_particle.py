@@ -190,7 +190,7 @@ def test_luminaires_that_send_nothing_are_named():
     scene.programs[1] = surface(0.4, 2.0, name="Embers")
     scene.programs[1].emission_sampling = "NONE"
     scene.programs.append(surface(glow=1.0, name="Sky"))
-    scene.world = sd.World(program=len(scene.programs) - 1, sampled=False)
+    scene.world = sd.World(program=len(scene.programs) - 1, sampling="NONE")
     scene.film = sd.Film(4, 4)
     scene.camera = sd.Camera("camera", "ORTHO", looking((0, 0, 0.9), (0, 0, -1)), (-1, 1, -1, 1), 0.0, 1e6)
     with Session(scene, sd.Settings("particle", 1, parameters={"particles": 100})) as session:

@@ -30,7 +30,8 @@ class EmbreeAccel final : public Accel {
  public:
   EmbreeAccel(const std::string& library, std::vector<AccelMesh> meshes, std::vector<AccelInstance> instances, int threads)
       : api_(load_embree(library)) {
-    const std::string config = threads > 0 ? "threads=" + std::to_string(threads) : "";
+    // Never one thread: TBB 2021.12 then leaves a worker that asks for work for ever, from the second device on.
+    const std::string config = threads > 0 ? "threads=" + std::to_string(std::max(threads, 2)) : "";
     device_ = api_.NewDevice(config.c_str());
     if (!device_) throw DeviceError("Embree could not start (library " + library + ")");
     try {
