@@ -88,7 +88,7 @@ class BdptIntegrator final : public Integrator {
         const size_t first = light.vertices.count(), lattice = light.lattice(x, y);
         trace_from_light(context, s_, sampler, light.vertices);
         ++light.counts[lattice];
-        for (size_t k = first; k < light.vertices.count(); ++k)
+        for (size_t k = first; s_.limits.total > 0 && k < light.vertices.count(); ++k)
           if (strategies_.shows(light.vertices[k].s())) light.choices[lattice].add(light.vertices[k], uint32_t(k));
         splat(context, film, sampler, light.vertices, first);
       }

@@ -127,6 +127,8 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
       v.power = carried.power * passed;
     }
     vertices.keep();
+    const bool is_last = v.bounces.total >= std::min(settings.limits.total, v.max_bounces) - (v.is_first() ? 0 : 1);
+    if (is_last && !(v.bsdf.flags() & kTransparent)) return;
 
     // Draw the next direction.
     const float u_lobe = sampler.next_1d(), u_continue = sampler.next_1d();
