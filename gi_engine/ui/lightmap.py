@@ -40,9 +40,13 @@ class GI_OT_bake_lightmap(bpy.types.Operator):
     bl_idname = "gi_engine.bake_lightmap"
     bl_label = "Bake Lightmap"
     bl_options = {"REGISTER", "UNDO"}
+    running = False  # one at a time
 
     @classmethod
     def poll(cls, context):
+        if cls.running:
+            cls.poll_message_set("A lightmap is being baked; Esc stops that")
+            return False
         if context.mode != "OBJECT":
             cls.poll_message_set("Only in Object Mode")
             return False
@@ -72,6 +76,7 @@ class GI_OT_bake_lightmap(bpy.types.Operator):
             return {"CANCELLED"}
         self.timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)
+        type(self).running = True
         return {"RUNNING_MODAL"}
 
     def begin(self, context) -> dict[str, bake.Request]:
@@ -86,13 +91,17 @@ class GI_OT_bake_lightmap(bpy.types.Operator):
         return wanted
 
     def next(self, context) -> None:
-        self.session, self.request, warnings = bake.prepare(context, self.left.pop(0))
+        wanted = self.left.pop(0)
+        layers = bpy.data.objects[wanted.object].data.uv_layers
+        before = set(layers.keys())
+        self.session, self.request, warnings = bake.prepare(context, wanted)
+        self.made_map = self.request.uv_map not in before
         self.tell("", warnings)
         self.session.__enter__()
 
     def modal(self, context, event):
         if event.type == "ESC":
-            self.end(context)
+            self.cancel(context)
             self.report({"INFO"}, "Baking was cancelled; lightmaps that were finished stay")
             return {"CANCELLED"}
         if event.type != "TIMER":
@@ -118,7 +127,16 @@ class GI_OT_bake_lightmap(bpy.types.Operator):
         self.end(context)
         return {"FINISHED"}
 
+    def cancel(self, context) -> None:
+        """By Esc, or by Blender, which opens another file or closes the window. The mesh is left as it was."""
+        self.end(context)
+        item = bpy.data.objects.get(self.request.object)
+        layer = item and item.type == "MESH" and item.data.uv_layers.get(self.request.uv_map)
+        if self.made_map and layer:
+            item.data.uv_layers.remove(layer)
+
     def end(self, context) -> None:
+        type(self).running = False
         if self.session is not None:
             self.session.__exit__()
         context.window_manager.event_timer_remove(self.timer)

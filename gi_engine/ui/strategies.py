@@ -21,6 +21,13 @@ class GI_OT_render_strategies(bpy.types.Operator):
 
     directory: bpy.props.StringProperty(subtype="DIR_PATH")
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+    running = False  # one at a time
+
+    @classmethod
+    def poll(cls, context):
+        if cls.running:
+            cls.poll_message_set("Strategies are being rendered; Esc stops that")
+        return not cls.running
 
     def invoke(self, context, event):
         context.window_manager.fileselect_add(self)
@@ -40,6 +47,7 @@ class GI_OT_render_strategies(bpy.types.Operator):
             return self.fail(error)
         self.timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)
+        type(self).running = True
         return {"RUNNING_MODAL"}
 
     def next(self) -> bool:
@@ -50,7 +58,7 @@ class GI_OT_render_strategies(bpy.types.Operator):
 
     def modal(self, context, event):
         if event.type == "ESC":
-            self.end(context)
+            self.cancel(context)
             self.report({"INFO"}, "The strategies were cancelled; nothing is written")
             return {"CANCELLED"}
         if event.type != "TIMER":
@@ -73,7 +81,12 @@ class GI_OT_render_strategies(bpy.types.Operator):
         self.end(context)
         return self.finish(self.pyramid.warnings, len(self.pyramid.images))
 
+    def cancel(self, context) -> None:
+        """By Esc, or by Blender, which opens another file or closes the window."""
+        self.end(context)
+
     def end(self, context) -> None:
+        type(self).running = False
         if self.session is not None:
             self.session.__exit__()
         context.window_manager.event_timer_remove(self.timer)
