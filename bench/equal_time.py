@@ -31,6 +31,7 @@ WAYS = {
     "irradiance_cache": ("GI_ENGINE", "irradiance_cache"),
     "photon_map": ("GI_ENGINE", "photon_map"),
     "sppm": ("GI_ENGINE", "sppm"),
+    "vcm": ("GI_ENGINE", "vcm"),
     "cycles": ("CYCLES", ""),
 }
 UNBIASED = ("bdpt", "path")  # of which one makes the reference

@@ -1,11 +1,12 @@
 // Bidirectional path tracing: a subpath from the light and one from the eye, every vertex of the one joined to every vertex of the
 // other, all ways to make the same path weighed against one another [Lafortune & Willems 1993; Veach 1997, ch. 10]. The vertices of the
 // other are drawn from those of several light subpaths, which the weights take as so many samples [Veach 1997, §9.2.1; Popov 2015].
+// Vertex connection and merging adds one more way: eye vertices are merged with light vertices nearby [Georgiev et al. 2012]; merging
+// alone is progressive photon mapping.
 #include "integrators/integrator.h"
 #include "transport/camera_path.h"
 #include "transport/light_choice.h"
-#include "transport/light_path.h"
-#include "transport/subpath.h"
+#include "transport/light_merge.h"
 
 namespace gi {
 namespace {
@@ -37,18 +38,28 @@ struct EyeVertex {
   const Bsdf& bsdf;
   PartialWeights weights;
   const PathState& state;
+  float merged;  // the weight of merging here
+};
+
+// Which vertices are merged: those of a pass's own light paths, within a radius that shrinks from pass to pass.
+struct Merging {
+  int paths = 0;     // at most; 0: none
+  float radius = 0;  // in the first pass, pixels
+  double alpha = 1;
+  bool alone = false;  // nothing else: photon mapping
 };
 
 class BdptIntegrator final : public Integrator {
  public:
-  explicit BdptIntegrator(const Parameters& p)
+  BdptIntegrator(const Parameters& p, Strategies strategies, Merging merging)
       : s_{{p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
             p.integer("transparent_bounces")},
            {p.integer("heuristic") == 0},
            {},
            p.real("connections")},
         connections_(p.integer("connections")),
-        strategies_{p.integer("only_s"), p.integer("only_t"), p.on("weighted")},
+        strategies_(strategies),
+        merging_(merging),
         min_bounces_(p.integer("min_bounces")),
         clamp_direct_(p.real("clamp_direct")),
         clamp_indirect_(p.real("clamp_indirect")) {}
@@ -57,7 +68,10 @@ class BdptIntegrator final : public Integrator {
     const FilmSpec& spec = film.spec();
     if (pass == 0) film.start_splats(splat_unit(context));
     s_.footprint = {context.camera, spec.width, spec.height};
-    const auto from_light = [&](const Tile& tile) { shine(context, pass, film, tile, tile_light()); };
+    if (merging_.paths > 0) send_photons(context, pass, film);
+    const auto from_light = [&](const Tile& tile) {
+      if (!merging_.alone) shine(context, pass, film, tile, tile_light());
+    };
     const auto from_eye = [&](const CameraRay& camera, Sampler& sampler, PixelSample& result, int x, int y) {
       const TileLight& light = tile_light();
       trace(context, film, camera, light, light.lattice(x, y), sampler, result);
@@ -71,6 +85,26 @@ class BdptIntegrator final : public Integrator {
   static TileLight& tile_light() {
     static thread_local TileLight light;
     return light;
+  }
+
+  // What eye vertices of this pass will be merged with. Their paths are not those that are joined, so there may be as many as wished; they
+  // aim at what is seen, which the weights know nothing of.
+  void send_photons(const RenderContext& context, int pass, const Film& film) {
+    constexpr uint8_t kClasses = kCausticPhoton | kGlobalPhoton;
+    const int paths = std::min(merging_.paths, film.spec().region_width() * film.spec().region_height());
+    const double scale = merging_.radius * std::sqrt(shrinking(pass, merging_.alpha));
+    s_.merges = float(double(paths) * sqr(scale) * double(kPi) / double(s_.joined));
+    SubpathSettings light = s_;
+    if (guide_is_old_) {
+      light.guide = nullptr;
+      guide_ = learn_emission(context, light, paths, kClasses, find_seen(context, film, s_.limits, false));
+      guide_is_old_ = context.cancelled;
+    }
+    light.guide = &guide_;
+    photons_ = LightMerge(context, light, pass, paths);
+    radius_ = float(scale);
+    context.log.set("photons", double(photons_.size()));
+    context.log.set("radius, pixels", scale);
   }
 
   // The light subpaths of a tile.
@@ -109,7 +143,7 @@ class BdptIntegrator final : public Integrator {
       const auto c = connect_to_lens(context, s_.limits, v, pixels, u_lens);
       if (!c) continue;
       // All light subpaths of a pass may fall on the pixel, its own eye subpath is one. [Georgiev 2012, eq. 46]
-      const float others = v.weights.sum(s_.heuristic, c->pdf_area * s_.joined / count, c->pdf_reverse);
+      const float others = v.weights.sum(s_.heuristic, c->pdf_area * s_.joined / count, c->pdf_reverse, s_.merged(v.point.position));
       const float weight = strategies_.weight(v.s(), 1, 1.0f / (1.0f + others)), alpha = worth_a_look(weight);
       if (!(u_pixel.x < alpha)) continue;
       u_pixel.x /= alpha;
@@ -139,7 +173,7 @@ class BdptIntegrator final : public Integrator {
     const auto found = [&](Rgb radiance, float pdf_direct, uint32_t emitter) {
       if (is_black(radiance)) return Rgb();
       float others = 0;
-      if (path.state.depth > 0)
+      if (path.state.depth > 0 && !merging_.alone)
         others = h(pdf_direct) * weights.vcm +
                  h(meets ? s_.joined * pdf_emit(context, emitter, path.origin.query.position, path.ray.direction) : 0.0f) * weights.vc;
       return radiance * strategies_.weight(0, path.state.depth + 2, 1.0f / (1.0f + others));
@@ -168,7 +202,7 @@ class BdptIntegrator final : public Integrator {
       add(emitted, path.state.depth);
       const float cos_in = abs_dot(point.ng, point.wo);
       if (!(cos_in > 0.0f)) break;
-      EyeVertex here{point, bsdf, weights.arrived(h, segment, cos_in), path.state};
+      EyeVertex here{point, bsdf, weights.arrived(h, segment, cos_in), path.state, s_.merged(point.position)};
       if (path.state.depth == 0)
         here.weights = {h(light_count / (s_.joined * lens_density(context.camera, camera.ray, segment) * pixels * cos_in)),
                         0.0f};  // [eq. 45]
@@ -176,7 +210,11 @@ class BdptIntegrator final : public Integrator {
       const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
       const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
       const float u_continue = sampler.next_1d(), u_joined = sampler.next_1d();
-      if (may_scatter && !bsdf.is_delta()) {
+      if (may_scatter && !bsdf.is_delta() && merging_.paths > 0) {
+        result.radiance += path.throughput * merge(context, here);
+        if (merging_.alone) bsdf.choose(kSpecular | kTransparent, point.wo);
+      }
+      if (may_scatter && !bsdf.is_delta() && !merging_.alone) {
         add(direct_light(context, here, u_light_choice, u_light), path.state.depth + 1);
         const auto join = [&](uint32_t k, float times, float u_left) {
           add(connect(context, here, light.vertices[k], u_left) / (times * float(light.counts[lattice])), path.state.depth + 2);
@@ -205,7 +243,7 @@ class BdptIntegrator final : public Integrator {
       // Follow it.
       const bool is_delta = next->flags & kSpecular;
       const float pdf_reverse = is_delta || here.weights.vc == 0.0f ? 0.0f : reverse(context, here, next->wi).pdf_dir;
-      weights = here.weights.scattered(h, is_delta, abs_dot(point.ng, next->wi), next->pdf_dir, pdf_reverse);
+      weights = here.weights.scattered(h, is_delta, abs_dot(point.ng, next->wi), next->pdf_dir, pdf_reverse, here.merged);
       meets = meets_light(context.scene, point);
       travelled = 0;
       may_scatter = advance(path.state, next->flags, s_.limits);
@@ -237,7 +275,8 @@ class BdptIntegrator final : public Integrator {
     const float pdf_emitted = meets_light(context.scene, z.point) ? pdf_emit(context, light->light, z.point.position, light->wi) : 0.0f;
     if (pdf_emitted > 0.0f) {
       const float pdf_area = pdf_emitted * abs_dot(z.point.ng, light->wi) / light->pdf_dir;
-      others += h(s_.joined) * z.weights.sum(h, pdf_area, z.weights.vc > 0.0f ? reverse(context, z, light->wi).pdf_dir : 0.0f);
+      const float pdf_reverse = z.weights.vc > 0.0f ? reverse(context, z, light->wi).pdf_dir : 0.0f;
+      others += h(s_.joined) * z.weights.sum(h, pdf_area, pdf_reverse, z.merged);
     }
     const float weight = strategies_.weight(1, z.state.depth + 2, 1.0f / (1.0f + others));
     return shadowed(context, z.point, *light, e.value * light->radiance * (weight / light->pdf_dir));
@@ -257,8 +296,7 @@ class BdptIntegrator final : public Integrator {
     // Bounces as Blender counts them.
     const uint8_t at_z = bounce_flags(z.bsdf, z.point, w);
     BounceCount bounces = y.bounces;
-    bounces.total += z.state.depth, bounces.diffuse += z.state.diffuse_depth, bounces.glossy += z.state.glossy_depth,
-        bounces.transmission += z.state.transmission_depth;
+    bounces.add(bounces_of(z.state));
     bounces.add(at_z);
     if (!y.is_first()) bounces.add(bounce_flags(y.bsdf, y.point, -w));
     if (!bounces.within(s_.limits) || bounces.total > y.max_bounces) return Rgb();
@@ -272,10 +310,11 @@ class BdptIntegrator final : public Integrator {
                 to_z = std::abs(cos_z) / sqr(distance);  // densities per area, for those per steradian
     const Rgb value = y.power * at_y.value * from_z.value * (to_y / abs_dot(y.point.ng, y.point.wo));
 
-    // The weight. [Georgiev 2012, eq. 37, 38, 40, 41]
+    // The weight. [Georgiev 2012, eq. 37, 40, 41]
     const float pdf_y = y.bsdf.eval(y.point.wo, -w).pdf_dir;
-    const float others = y.weights.sum(h, from_z.pdf_dir * to_y, at_y.pdf_dir) +
-                         z.weights.sum(h, pdf_y * to_z, z.weights.vc > 0.0f ? reverse(context, z, w).pdf_dir : 0.0f);
+    const float pdf_reverse = z.weights.vc > 0.0f ? reverse(context, z, w).pdf_dir : 0.0f;
+    const float others = y.weights.sum(h, from_z.pdf_dir * to_y, at_y.pdf_dir, s_.merged(y.point.position)) +
+                         z.weights.sum(h, pdf_y * to_z, pdf_reverse, z.merged);
     const float weight = strategies_.weight(y.s(), z.state.depth + 2, 1.0f / (1.0f + others)), alpha = worth_a_look(weight);
     if (is_black(value) || !(u < alpha)) return Rgb();
 
@@ -289,6 +328,30 @@ class BdptIntegrator final : public Integrator {
                    s_.limits.transparent);
   }
 
+  // Light subpaths that came here too, all as if to the same point. [Georgiev et al. 2012, eq. 8]
+  Rgb merge(const RenderContext& context, const EyeVertex& z) const {
+    const Heuristic h = s_.heuristic;
+    Rgb direct, indirect;
+    photons_.near(z.point.position, z.point.ng, radius_ * s_.footprint(z.point.position), [&](const MergeVertex& y, Rgb power_per_area) {
+      const Vec3 wi = y.wi.unpack();
+      BounceCount bounces = y.bounces();
+      bounces.add(bounces_of(z.state));
+      if (!y.is_first) bounces.add(bounce_flags(z.bsdf, z.point, wi));
+      if (!bounces.within(s_.limits) || bounces.total > y.max_bounces) return;
+      const LobeEval e = eval_seen_by(z.bsdf, z.point.wo, wi, y.seen_by);
+      const float cosine = abs_dot(y.normal.unpack(), wi);
+      if (is_black(e.value) || !(cosine > 1e-4f)) return;
+      float weight = 1.0f;
+      if (!merging_.alone) {  // [Georgiev 2012, eq. 37 to 39]
+        const float pdf_reverse = z.weights.vc > 0.0f ? reverse(context, z, wi).pdf_dir : 0.0f;
+        const float others = y.weights.vcm + h(e.pdf_dir) * y.weights.vc + z.weights.vcm + h(pdf_reverse) * z.weights.vc;
+        weight = z.merged / (z.merged + others);
+      }
+      (y.is_first && z.state.depth == 0 ? direct : indirect) += power_per_area * e.value * (weight / cosine);
+    });
+    return clamp_contribution(direct, clamp_direct_) + clamp_contribution(indirect, clamp_indirect_);
+  }
+
   // Past its last bounce the path only looks for luminaires.
   static bool ends_unlit(const RenderContext& context, const CameraPath& path, const Hit& hit) {
     const Program& program = context.scene.material(context.scene.material_of(hit.instance, hit.triangle)).program;
@@ -297,6 +360,8 @@ class BdptIntegrator final : public Integrator {
 
   // Russian roulette before the shadow ray of a connection, by its weight: little is lost where other ways do better.
   static float worth_a_look(float weight) { return std::min(1.0f, weight * 20.0f); }
+
+  static BounceCount bounces_of(const PathState& eye) { return {eye.depth, eye.diffuse_depth, eye.glossy_depth, eye.transmission_depth}; }
 
   // The density with which light that comes to z from w would go on to where z was seen from.
   static LobeEval reverse(const RenderContext& context, const EyeVertex& z, Vec3 w) {
@@ -348,47 +413,92 @@ class BdptIntegrator final : public Integrator {
   SubpathSettings s_;
   int connections_;
   Strategies strategies_;
+  Merging merging_;
   int min_bounces_;
   float clamp_direct_, clamp_indirect_;
+  EmissionGuide guide_;
+  bool guide_is_old_ = true;
+  LightMerge photons_;
+  float radius_ = 0;  // within which they are merged in this pass, pixels
 };
+
+using Kind = Parameter::Kind;
+
+// Those of both, and others.
+std::vector<Parameter> with(std::vector<Parameter> others) {
+  std::vector<Parameter> all{
+      {"heuristic",
+       "Heuristic",
+       Kind::kChoice,
+       0,
+       0,
+       1,
+       "How the ways to make a path are weighed against one another",
+       "",
+       {{"POWER", "Power", "By the squares of their densities"}, {"BALANCE", "Balance", "By their densities"}}},
+      {"min_bounces", "Minimum Bounces", Kind::kInt, 0, 0, 1024, "Bounces before roulette begins"},
+      {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
+      {"diffuse_bounces", "Diffuse", Kind::kInt, 4, 0, 1024, "Diffuse reflections"},
+      {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},
+      {"transmission_bounces", "Transmission", Kind::kInt, 12, 0, 1024, "Refractions"},
+      {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
+      {"clamp_direct", "Clamp Direct", Kind::kFloat, 0, 0, 1e9, "Largest radiance that one sample may add directly; 0 is off. Loses light"},
+      {"clamp_indirect", "Clamp Indirect", Kind::kFloat, 0, 0, 1e9,
+       "Largest radiance that one sample may add after a bounce; 0 is off. Loses light"},
+      {"connections", "Connections", Kind::kInt, 3, 1, 64,
+       "Vertices from the light that each vertex from the eye is joined to, of all those of 16 light paths"},
+  };
+  all.insert(all.end(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));
+  return all;
+}
 
 }  // namespace
 
 const Descriptor& bdpt_descriptor() {
-  using Kind = Parameter::Kind;
   static const Descriptor descriptor{
-      "bdpt",
-      "Bidirectional Path Tracing",
+      "bdpt", "Bidirectional Path Tracing",
       "Paths from the eye and from the lights, joined in every way: for light that comes around corners and through glass; unbiased. "
       "Light Path nodes see diffuse rays where light arrives from a lamp's side",
-      {
-          {"heuristic",
-           "Heuristic",
-           Kind::kChoice,
-           0,
-           0,
-           1,
-           "How the ways to make a path are weighed against one another",
-           "",
-           {{"POWER", "Power", "By the squares of their densities"}, {"BALANCE", "Balance", "By their densities"}}},
-          {"min_bounces", "Minimum Bounces", Kind::kInt, 0, 0, 1024, "Bounces before roulette begins"},
-          {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
-          {"diffuse_bounces", "Diffuse", Kind::kInt, 4, 0, 1024, "Diffuse reflections"},
-          {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},
-          {"transmission_bounces", "Transmission", Kind::kInt, 12, 0, 1024, "Refractions"},
-          {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
-          {"clamp_direct", "Clamp Direct", Kind::kFloat, 0, 0, 1e9,
-           "Largest radiance that one sample may add directly; 0 is off. Loses light"},
-          {"clamp_indirect", "Clamp Indirect", Kind::kFloat, 0, 0, 1e9,
-           "Largest radiance that one sample may add after a bounce; 0 is off. Loses light"},
-          {"connections", "Connections", Kind::kInt, 3, 1, 64,
-           "Vertices from the light that each vertex from the eye is joined to, of all those of 16 light paths"},
+      with({
           {"only_s", "Only s", Kind::kInt, -1, -1, 1024, "Shows only paths with this many vertices from the light; -1: all"},
           {"only_t", "Only t", Kind::kInt, -1, -1, 1024,
            "Shows only paths with this many vertices from the eye, the lens among them; -1: all"},
           {"weighted", "Weighted", Kind::kBool, 1, 0, 1, "Off: every way counts in full, to look at one of them alone"},
-      },
-      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<BdptIntegrator>(p); }};
+      }),
+      [](const Parameters& p) -> std::unique_ptr<Integrator> {
+        return std::make_unique<BdptIntegrator>(p, Strategies{p.integer("only_s"), p.integer("only_t"), p.on("weighted")}, Merging{});
+      }};
+  return descriptor;
+}
+
+const Descriptor& vcm_descriptor() {
+  static const Descriptor descriptor{
+      "vcm", "Vertex Connection and Merging",
+      "Bidirectional path tracing and progressive photon mapping as one: also caustics that are seen in mirrors and through glass. A "
+      "little "
+      "blurred at first, right in the end",
+      with({
+          {"terms",
+           "Terms",
+           Kind::kChoice,
+           0,
+           0,
+           2,
+           "Ways that are taken to make a path",
+           "",
+           {{"ALL", "All", "Vertices are connected and merged"},
+            {"CONNECT", "Connection", "Bidirectional path tracing alone"},
+            {"MERGE", "Merging", "Progressive photon mapping alone; lights come to diffuse and glossy surfaces as photons only"}}},
+          {"photons", "Photons", Kind::kInt, 1000000, 1, 1e9,
+           "Most light paths that are sent out in each pass for merging; no more than pixels"},
+          {"radius", "Radius", Kind::kFloat, 3, 0.1, 1000, "Within which vertices are merged in the first pass, in pixels"},
+          {"alpha", "Alpha", Kind::kFloat, 0.75, 0.05, 1, "How much of a disc's photons the next pass keeps: less is sharper and noisier"},
+      }),
+      [](const Parameters& p) -> std::unique_ptr<Integrator> {
+        const int terms = p.integer("terms");
+        const Merging merging{terms == 1 ? 0 : p.integer("photons"), p.real("radius"), p.number("alpha"), terms == 2};
+        return std::make_unique<BdptIntegrator>(p, Strategies{-1, -1, true}, merging);
+      }};
   return descriptor;
 }
 

@@ -17,13 +17,13 @@ const Descriptor& bdpt_descriptor();
 const Descriptor& particle_descriptor();
 const Descriptor& photon_map_descriptor();
 const Descriptor& sppm_descriptor();
+const Descriptor& vcm_descriptor();
 const Descriptor& irradiance_cache_descriptor();
 
 const std::vector<Descriptor>& integrators() {
   static const std::vector<Descriptor> all{
-      whitted_descriptor(),    distributed_descriptor(), path_descriptor(),
-      light_descriptor(),      bdpt_descriptor(),        particle_descriptor(),
-      photon_map_descriptor(), sppm_descriptor(),        irradiance_cache_descriptor(),
+      whitted_descriptor(),  distributed_descriptor(), path_descriptor(), light_descriptor(), bdpt_descriptor(),
+      particle_descriptor(), photon_map_descriptor(),  sppm_descriptor(), vcm_descriptor(),   irradiance_cache_descriptor(),
   };
   return all;
 }

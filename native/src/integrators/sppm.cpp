@@ -26,9 +26,9 @@ class SppmIntegrator final : public Integrator {
     light.guide = &guide_;
     const PhotonMap map(trace_photons(context, light, pass, photons_, kCausticPhoton | kGlobalPhoton), photons_, context.pool);
     if (context.cancelled) return;
+    const float scale = radius_ * float(std::sqrt(shrinking(pass, alpha_)));
     context.log.set("photons", double(map.size()));
-    context.log.set("radius, pixels", double(radius_) * std::sqrt(shrinking(pass)));
-    const float scale = radius_ * float(std::sqrt(shrinking(pass)));
+    context.log.set("radius, pixels", double(scale));
     for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) {
       trace_to_diffuse(
           context, film, s_, camera, sampler, result, [](const ShadingPoint&, const Bsdf&) { return Rgb(); },
@@ -37,9 +37,6 @@ class SppmIntegrator final : public Integrator {
   }
 
  private:
-  // The squared radius of a pass over the first one's: ∏ (i + α) / (i + 1). [Knaus & Zwicker 2011, eq. 15]
-  double shrinking(int pass) const { return std::exp(std::lgamma(pass + 1 + alpha_) - std::lgamma(1 + alpha_) - std::lgamma(pass + 2.0)); }
-
   int photons_;
   float radius_;
   double alpha_;

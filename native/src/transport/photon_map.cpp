@@ -6,9 +6,6 @@
 namespace gi {
 namespace {
 
-constexpr float kSlope = 0.8f;      // least cosine between the normals of one surface
-constexpr float kThickness = 0.3f;  // how far off the plane photons may lie, of the radius
-
 float sign_of(float x) { return x < 0.0f ? -1.0f : 1.0f; }
 
 // The limits of the eye, less what the light's part of the path has used up; nothing if that is more than there is.
@@ -82,30 +79,9 @@ Vec3 PackedDirection::unpack() const {
   return normalize({(1.0f - std::abs(y)) * sign_of(x), (1.0f - std::abs(x)) * sign_of(y), z});
 }
 
-namespace {
-
-// Calls f(path, k) for the light paths of a pass, in batches of threads: f(batch) makes what the paths of a batch are given to.
-template <class Batch, class F>
-std::vector<Batch> for_each_path(const RenderContext& context, const SubpathSettings& settings, int pass, int count, const F& f) {
-  constexpr int kBatch = 1024;
-  std::vector<Batch> found(size_t((count + kBatch - 1) / kBatch));
-  context.pool.for_each(int(found.size()), context.cancelled, [&](int b) {
-    static thread_local LightVertices path;
-    for (int k = b * kBatch; k < std::min((b + 1) * kBatch, count); ++k) {
-      Sampler sampler = light_sampler(context, pass, count, uint32_t(k));
-      path.clear();
-      trace_from_light(context, settings, sampler, path);
-      f(path, found[size_t(b)]);
-    }
-  });
-  return found;
-}
-
-}  // namespace
-
 std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes) {
-  auto found =
-      for_each_path<std::vector<Photon>>(context, settings, pass, count, [&](const LightVertices& path, std::vector<Photon>& photons) {
+  return joined(
+      trace_light_paths<std::vector<Photon>>(context, settings, pass, count, [&](const LightVertices& path, std::vector<Photon>& photons) {
         for (int i = 0; i < int(path.count()); ++i) {
           const LightVertex& v = path[size_t(i)];
           const Rgb power = power_of(v, classes);
@@ -116,13 +92,11 @@ std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSet
           photon->power[0] = power.r(), photon->power[1] = power.g(), photon->power[2] = power.b();
           photons.push_back(*photon);
         }
-      });
-  size_t total = 0;
-  for (const auto& part : found) total += part.size();
-  std::vector<Photon> all;
-  all.reserve(total);
-  for (auto& part : found) all.insert(all.end(), part.begin(), part.end()), std::vector<Photon>().swap(part);
-  return all;
+      }));
+}
+
+double shrinking(int pass, double alpha) {
+  return std::exp(std::lgamma(pass + 1 + alpha) - std::lgamma(1 + alpha) - std::lgamma(pass + 2.0));
 }
 
 SeenPoints find_seen(const RenderContext& context, const Film& film, const BounceLimits& limits, bool gathers) {
@@ -161,7 +135,7 @@ EmissionGuide learn_emission(const RenderContext& context, SubpathSettings setti
     // Numbered apart from the paths that count: what is learnt from a path must not decide on the same path.
     const int pass = -1 - round;
     const auto found =
-        for_each_path<std::vector<EmissionGuide::Trial>>(context, settings, pass, count, [&](const LightVertices& path, auto& trials) {
+        trace_light_paths<std::vector<EmissionGuide::Trial>>(context, settings, pass, count, [&](const LightVertices& path, auto& trials) {
           float worth = 0.0f;
           for (int i = 0; i < int(path.count()); ++i) {
             const LightVertex& v = path[size_t(i)];
@@ -194,7 +168,7 @@ float PhotonMap::spread(Vec3 position, size_t count) const {
 }
 
 bool PhotonMap::is_of(uint32_t k, Vec3 position, Vec3 normal, float radius) const {
-  return abs_dot(tree_.point(k) - position, normal) < kThickness * radius && abs_dot(lights_[k].normal.unpack(), normal) > kSlope;
+  return of_one_surface(tree_.point(k) - position, lights_[k].normal.unpack(), normal, radius);
 }
 
 // f Φ: irradiance is by the true normal, whatever normals the lobes weigh light by.

@@ -43,11 +43,22 @@ enum PhotonClass : uint8_t {
 // the photons over `count`. The order is that of the paths.
 std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes);
 
+// The squared radius of a pass over the first one's, where each is to keep `alpha` of the photons of a disc: ∏ (i + α) / (i + 1).
+// [Knaus & Zwicker 2011, eq. 15]
+double shrinking(int pass, double alpha);
+
 // Points on diffuse surfaces that eye paths end at, after gathering or without.
 SeenPoints find_seen(const RenderContext& context, const Film& film, const BounceLimits& limits, bool gathers);
 
 // Learns to send photons of `classes` to what is seen.
 EmissionGuide learn_emission(const RenderContext& context, SubpathSettings settings, int photons, uint8_t classes, const SeenPoints& seen);
+
+// Whether what lies `away` is taken to be of the same surface: of like slope, and not off the plane.
+inline bool of_one_surface(Vec3 away, Vec3 its_normal, Vec3 normal, float radius) {
+  constexpr float kSlope = 0.8f;      // least cosine between the normals
+  constexpr float kThickness = 0.3f;  // how far off the plane, of the radius
+  return abs_dot(away, normal) < kThickness * radius && abs_dot(its_normal, normal) > kSlope;
+}
 
 // Photons that can be looked up. Those of other surfaces are refused: of another slope, or off the plane of the point.
 class PhotonMap {

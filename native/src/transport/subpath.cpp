@@ -163,7 +163,7 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     const float alpha = std::min(1.0f, max_component(factor));
     if (u_continue >= alpha) return;
     carried.power = v.power * factor / alpha;
-    carried.weights = v.weights.scattered(h, is_delta, cos_out, next->pdf_dir, pdf_reverse);
+    carried.weights = v.weights.scattered(h, is_delta, cos_out, next->pdf_dir, pdf_reverse, settings.merged(v.point.position));
     carried.by_mirrors = is_delta ? v.by_mirrors : v.by_mirrors * (Rgb(1.0f) - diffuse_share(v, next->wi));
     if (settings.only_by_mirrors && is_black(carried.by_mirrors)) return;
     carried.scattered = v.scattered + 1, carried.seen_by = visible;

@@ -20,10 +20,11 @@ struct Heuristic {
 struct PartialWeights {
   float vcm = 0, vc = 0;
 
-  // [Georgiev 2012, eq. 34, 35] for a lobe with densities, [eq. 53, 54] for a delta lobe, which no other strategy can connect.
-  PartialWeights scattered(Heuristic h, bool is_delta, float cos_out, float pdf_forward, float pdf_reverse) const {
+  // [Georgiev 2012, eq. 34, 35] for a lobe with densities, [eq. 53, 54] for a delta lobe, which no other strategy can connect. `merged`:
+  // the weight of merging at this vertex.
+  PartialWeights scattered(Heuristic h, bool is_delta, float cos_out, float pdf_forward, float pdf_reverse, float merged) const {
     if (is_delta) return {0.0f, h(cos_out) * vc};
-    return {h(1.0f / pdf_forward), h(cos_out / pdf_forward) * (vcm + h(pdf_reverse) * vc)};
+    return {h(1.0f / pdf_forward), h(cos_out / pdf_forward) * (merged + vcm + h(pdf_reverse) * vc)};
   }
   // The ray meets a surface: densities per steradian become densities per area.
   PartialWeights arrived(Heuristic h, float distance, float cos_in) const {
@@ -31,12 +32,15 @@ struct PartialWeights {
   }
   // What the other strategies come to if this vertex were generated from the far side: `pdf_area` of itself, `pdf_reverse` of the one
   // before. [Georgiev 2012, eq. 37]
-  float sum(Heuristic h, float pdf_area, float pdf_reverse) const { return h(pdf_area) * (vcm + h(pdf_reverse) * vc); }
+  float sum(Heuristic h, float pdf_area, float pdf_reverse, float merged) const {
+    return h(pdf_area) * (merged + vcm + h(pdf_reverse) * vc);
+  }
 };
 
 // Bounces by kind, as Blender's limits count them: the one nearest to the light, which light sampling makes, is free.
 struct BounceCount {
   int total = 0, diffuse = 0, glossy = 0, transmission = 0;
+  void add(const BounceCount& b) { total += b.total, diffuse += b.diffuse, glossy += b.glossy, transmission += b.transmission; }
   void add(uint8_t flags) {
     ++total;
     ++(flags & kTransmission ? transmission : flags & kDiffuse ? diffuse : glossy);
@@ -96,8 +100,12 @@ struct SubpathSettings {
   Heuristic heuristic{};
   PixelFootprint footprint{};
   float joined = 1;  // light subpaths that each eye vertex is joined to, as the weights have it
+  float merges = 0;  // η of merging [Georgiev 2012, eq. 20] where a pixel has radius 1: of photons over those joined; 0: nothing is merged
   const EmissionGuide* guide = nullptr;  // which strategies that weigh densities against others' know nothing of
   bool only_by_mirrors = false;  // ends at the first vertex all of whose light diffuse lobes scattered
+
+  // The weight of merging at a vertex over that of joining it.
+  float merged(Vec3 position) const { return merges > 0.0f ? heuristic(merges * sqr(footprint(position))) : 0.0f; }
 };
 
 // Follows light from a luminaire chosen by its power, and adds the surfaces that it meets. Lamps that throw no shadow are left to
@@ -130,9 +138,9 @@ Rgb passage(const RenderContext& context, Ray ray, uint32_t visibility, PathStat
 // A light subpath's vertex joined to the lens.
 struct LensConnection {
   LensSample lens;
-  Rgb value;                // of a pixel whose filter is 1 there, but for what lies between, for one light path in all
-  float pdf_area = 0;       // of the vertex, by the rays of one sample for each pixel
-  float pdf_reverse = 0;    // of the vertex before, per steradian
+  Rgb value;  // of a pixel whose filter is 1 there, but for what lies between, for one light path in all
+  float pdf_area = 0;  // of the vertex, by the rays of one sample for each pixel
+  float pdf_reverse = 0;  // of the vertex before, per steradian
 };
 std::optional<LensConnection> connect_to_lens(const RenderContext& context, const BounceLimits& limits, const LightVertex& vertex,
                                               int pixels, Vec2 u_lens);
