@@ -40,8 +40,22 @@ def parser(commands_by_name: dict, in_blender: bool) -> argparse.ArgumentParser:
         help="instead of the picture: every strategy of a bidirectional integrator, weighted and not, into this folder",
     )
     render.add_argument("--resolution", type=resolution, metavar="WxH", help="pixels")
-    render.add_argument(
+    which = render.add_mutually_exclusive_group()
+    which.add_argument(
         "--frame", type=frames, metavar="N|A-B", help="one frame or a range; default: the scene's current frame"
+    )
+    which.add_argument("--animation", action="store_true", help="the scene's frames, from its first to its last")
+    render.add_argument(
+        "--cache",
+        type=Path,
+        metavar="FILE",
+        help="takes what an earlier render worked out from this file, and keeps there what this one adds",
+    )
+    render.add_argument(
+        "--cache-misfit",
+        type=str.upper,
+        choices=("WITHOUT", "REPLACE", "STOP"),
+        help="where the file is damaged or does not fit the scene: render without it, replace it, or stop",
     )
     add_sampling(render)
     render.set_defaults(command=commands_by_name["render"])
@@ -221,4 +235,8 @@ def overrides(arguments) -> dict:
         chosen["threads"] = arguments.threads
     if arguments.seed is not None:
         chosen["seed"] = arguments.seed
+    if getattr(arguments, "cache", None) is not None:
+        chosen["kept_file"] = str(arguments.cache.absolute())
+    if getattr(arguments, "cache_misfit", None) is not None:
+        chosen["kept_misfit"] = arguments.cache_misfit
     return chosen

@@ -72,7 +72,11 @@ def render_command(arguments, out, err) -> int:
 
 def settle(arguments, headless, scene) -> None:
     """Sets what is the scene's own: size and format. The rest reaches the engine by itself."""
-    check_parameters(find_integrator(arguments.integrator or scene.gi_engine.integrator), dict(arguments.set))
+    chosen = find_integrator(arguments.integrator or scene.gi_engine.integrator)
+    check_parameters(chosen, dict(arguments.set))
+    if arguments.cache is not None and not chosen["kept_version"]:
+        able = ", ".join(d["id"] for d in native.integrators() if d["kept_version"])
+        raise ArgumentError(f'--cache: integrator "{chosen["id"]}" has nothing to keep; these have: {able}')
     if arguments.resolution is not None:
         try:
             headless.set_resolution(scene, *arguments.resolution)
@@ -84,17 +88,40 @@ def settle(arguments, headless, scene) -> None:
 
 def render_frames(arguments, headless, scene, wishes: Control, display, streams) -> int:
     out, err = streams
-    for frame in arguments.frame or [scene.frame_current]:
+    arguments.frame = frames_of(arguments, scene)
+    look_ahead(arguments, headless, scene, wishes)
+    for frame in arguments.frame:
         written, passes = [], 0
         if not wishes.cancelled:
             written, passes = render_frame(arguments, headless, scene, frame, wishes, display)
         for name in written:
-            display.say(f"{name}: {passes} passes in {duration(wishes.last.seconds)}", out)
+            note = f", {wishes.last.note}" if wishes.last.note else ""
+            display.say(f"{name}: {passes} passes in {duration(wishes.last.seconds)}{note}", out)
         if wishes.cancelled:
             outcome = f"the picture has {passes} passes" if written else "no pass was finished, nothing is written"
             display.say(f"gi-engine: cancelled; {outcome}", err)
             return CANCELLED
     return DONE
+
+
+def frames_of(arguments, scene) -> list[int]:
+    if arguments.animation:
+        return list(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+    return list(arguments.frame or [scene.frame_current])
+
+
+def look_ahead(arguments, headless, scene, wishes: Control) -> None:
+    """Where an integrator keeps something from frame to frame, it is told where the camera will be."""
+    from . import camera_path
+    from .export import ExportError
+
+    chosen = find_integrator(arguments.integrator or scene.gi_engine.integrator)
+    if len(arguments.frame) < 2 or not chosen["kept_version"] or not scene.gi_engine.keep:
+        return
+    try:
+        wishes.path = camera_path.collect(headless.bpy.context, arguments.frame)
+    except ExportError as error:
+        raise RenderError(str(error)) from error
 
 
 def check_render(arguments) -> None:
@@ -104,11 +131,16 @@ def check_render(arguments) -> None:
     if arguments.integrator is not None:
         find_integrator(arguments.integrator)
     if arguments.strategies is not None:
-        if arguments.output is not None or len(arguments.frame or ()) > 1:
+        if arguments.output is not None or arguments.animation or len(arguments.frame or ()) > 1:
             raise ArgumentError(
                 "--strategies: writes one frame into its folder; leave --output and ranges of frames out"
             )
         check_folder(arguments.strategies)
+    if arguments.cache_misfit is not None and arguments.cache is None:
+        raise ArgumentError("--cache-misfit: there is no --cache")
+    if arguments.cache is not None:
+        with Target(arguments.cache):
+            pass
     if arguments.output is not None:
         check_suffix(arguments.output)
         with Target(arguments.output):
@@ -153,7 +185,7 @@ def render_strategies(arguments, headless, scene, wishes: Control, display, stre
 def render_frame(arguments, headless, scene, frame: int, wishes: Control, display) -> tuple[list, int]:
     """Renders one frame into its file. Returns the files and the passes in them; none where it was cancelled too soon."""
     if arguments.output is not None:
-        path = numbered(arguments.output, frame, always=len(arguments.frame or ()) > 1)
+        path = numbered(arguments.output, frame, always=arguments.animation or len(arguments.frame) > 1)
     else:
         path = headless.own_output(scene, frame)
     passes = 0

@@ -26,6 +26,7 @@ class Progress:
     seconds: float = 0.0  # of sampling; start-up not counted
     seconds_left: float | None = None  # None while nobody can say
     noise: float | None = None  # 95th percentile of the relative standard error, where it is measured
+    note: str = ""  # what the integrator has to say of itself
 
 
 @dataclass
@@ -39,6 +40,9 @@ class Control:
     inspect: Callable[[str, Scene, Settings], None] | None = None
     # Set by a signal handler; the engine stops after the poll that sees it and keeps what it has.
     cancelled: bool = False
+    # What one frame keeps for the next (keeping.Memory), and Cameras of frames to come.
+    kept: dict = field(default_factory=dict)
+    path: list = field(default_factory=list)
     last: Progress = field(default_factory=Progress)
     warnings: list[str] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)

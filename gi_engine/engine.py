@@ -6,6 +6,7 @@ import math
 import threading
 import time
 import traceback
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -14,6 +15,7 @@ from . import control, native
 from .bake import BakeError, bake_for_blender
 from .display import duration
 from .export import Exported, ExportError, export
+from .keeping import Keeping, KeepingError, KeptFileError, keeps
 from .passes import contract_name, passes_of
 from .session import RenderFailed, Session
 
@@ -23,12 +25,15 @@ WINDOW = not bpy.app.background
 # Seconds between what is told. Each status has the window draw the picture anew; without one, it is a line on the console.
 STATUS_SECONDS = 0.5 if WINDOW else 5.0
 SHOW_SECONDS, SHOW_SECONDS_LATER = 0.25, 3.0
-USER_ERRORS = (BakeError, ExportError, RenderFailed, native.NativeMissing)
+USER_ERRORS = (BakeError, ExportError, KeepingError, RenderFailed, native.NativeMissing)
 
 LEAVE_SECONDS = 10.0  # that a render has to stop when the add-on is switched off
 
 # Said once in an animation, not once a frame.
 _reported: set[str] = set()
+# What the frames of an animation keep for one another, and Cameras of frames to come.
+_kept: dict = {}
+_path: list = []
 # One entry for each render that is running, on threads of Blender's. Switching the add-on off has to end them first:
 # Blender crashes when a class goes while its render runs.
 _running: list[str] = []
@@ -90,17 +95,17 @@ class GIEngine(bpy.types.RenderEngine):
             if view:
                 self.active_view_set(view)
                 self.exported = self.export(depsgraph)
-            self.render_result(result, depsgraph.view_layer.name)
+            self.render_result(result, depsgraph)
             self.end_result(result)
         except Exception as error:
             self.end_result(result, cancel=True)
             self.fail(error)
 
-    def render_result(self, result, view_layer: str) -> None:
+    def render_result(self, result, depsgraph) -> None:
         scene, settings = self.exported.scene, self.exported.settings
         for message in self.exported.warnings:
             self.warn(message)
-        if control.inspected(view_layer, scene, settings):
+        if control.inspected(depsgraph.view_layer.name, scene, settings):
             return
         x0, y0, x1, y1 = scene.film.region
         if (x1 - x0, y1 - y0) != (result.resolution_x, result.resolution_y):
@@ -109,11 +114,38 @@ class GIEngine(bpy.types.RenderEngine):
             )
         self.update_stats("", "Building the scene")
         control.report(control.Progress(stage="Build"))
-        with Session(scene, settings) as session:
+        keeping = self.keeping(depsgraph) if keeps(settings) and not self.is_preview else None
+        tables = keeping.tables if keeping else None
+        path = (control.current.path if control.current else _path) if keeping and tables is None else ()
+        with Session(scene, settings, kept=tables, path=path) as session:
             self.exported.scene = None  # the native side has taken what it needs
             for message in session.warnings():
                 self.warn(message)
             self.stream(session, result)
+        if keeping:
+            self.hand_on(keeping, session)
+
+    def keeping(self, depsgraph) -> Keeping:
+        """What this render takes over."""
+        settings, scene, layer = self.exported.settings, depsgraph.scene, depsgraph.view_layer.name
+        memory = control.current.kept if control.current else _kept
+        path = Path(bpy.path.abspath(settings.kept_file)) if settings.kept_file else None
+        if path and sum(view_layer.use for view_layer in scene.view_layers) > 1:
+            path = path.with_stem(f"{path.stem}-{bpy.path.clean_name(layer)}")
+        keeping = Keeping(
+            self.exported.scene, settings, memory if settings.keep else {}, (scene.name_full, layer), path
+        )
+        for message in keeping.warnings:
+            self.warn(message)
+        return keeping
+
+    def hand_on(self, keeping: Keeping, session: Session) -> None:
+        try:
+            keeping.hand_on(session.native.kept())
+        except KeptFileError as error:
+            self.warn(str(error))
+        for message in keeping.messages:
+            self.report({"INFO"}, message)
 
     def stream(self, session: Session, result) -> None:
         """Shows the image as it grows until it is done or the user has had enough."""
@@ -164,6 +196,7 @@ class GIEngine(bpy.types.RenderEngine):
                 seconds=progress["seconds"],
                 seconds_left=left,
                 noise=noise,
+                note=progress.get("note", ""),
             )
         )
 
@@ -227,14 +260,23 @@ def status(progress: dict, left: float | None, samples: int) -> str:
         progress.get("stage") or f"Sample {progress['samples_per_pixel']:.0f}/{samples}",
         f"{rate:.1f} Mrays/s",
     ]
+    if progress.get("note"):
+        parts.append(progress["note"])
     if left is not None:
         parts.insert(0, f"Remaining {duration(left)}")
     return " | ".join(parts)
 
 
+def look_ahead(cameras: list) -> None:
+    """Where the camera will be in the frames of the render that begins next."""
+    _path[:] = cameras
+
+
 @bpy.app.handlers.persistent
-def forget_warnings(*_):
+def forget(*_):
     _reported.clear()
+    _kept.clear()
+    _path.clear()
 
 
 HANDLERS = (bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel, bpy.app.handlers.load_post)
@@ -255,11 +297,11 @@ def register() -> None:
     _leaving.clear()
     bpy.utils.register_class(GIEngine)
     for handlers in HANDLERS:
-        handlers.append(forget_warnings)
+        handlers.append(forget)
 
 
 def unregister() -> None:
     stop_renders()
     for handlers in HANDLERS:
-        handlers.remove(forget_warnings)
+        handlers.remove(forget)
     bpy.utils.unregister_class(GIEngine)

@@ -12,6 +12,11 @@ from . import native
 from .export.settings import SHARED
 from .scene_data import LIGHTMAP_CONTENTS as CONTENTS
 
+MISFITS = (
+    ("WITHOUT", "Render Without", "Leave the file as it is, under a warning"),
+    ("REPLACE", "Replace", "Start a new one in its place, unless it is no file of GI Engine's"),
+    ("STOP", "Stop", "Do not render"),
+)
 FILTERS = (
     ("BOX", "Box", "Equal weight over the filter's width"),
     ("GAUSSIAN", "Gaussian", "Bell curve"),
@@ -51,6 +56,20 @@ def fixed_properties() -> dict:
         ),
         "seed": IntProperty(name="Seed", description="Another seed gives another pattern of noise", min=0),
         "use_animated_seed": BoolProperty(name="Animate Seed", description="Another seed for each frame"),
+        "keep": BoolProperty(
+            name="Keep for Further Frames",
+            description="Of an animation: what was worked out for one frame serves the next, so that still things do not flicker. "
+            "Where objects have changed, what lies near them is left out; where lights have, everything is",
+            default=True,
+        ),
+        "kept_file": StringProperty(
+            name="Cache File",
+            description="Keeps what was worked out from one render to the next; empty for no file",
+            subtype="FILE_PATH",
+        ),
+        "kept_misfit": EnumProperty(
+            name="Unusable File", description="Where the file is damaged or does not fit the scene", items=MISFITS
+        ),
         "film_exposure": FloatProperty(
             name="Exposure", description="Image brightness scale", default=1, min=0, soft_max=10
         ),

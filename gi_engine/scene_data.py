@@ -208,3 +208,6 @@ class Settings:
     seed: int = 0
     threads: int = 0  # 0: all
     parameters: dict = field(default_factory=dict)
+    keep: bool = True  # what the integrator can keep serves further frames
+    kept_file: str = ""  # which holds it from render to render; "": none
+    kept_misfit: str = "WITHOUT"  # WITHOUT, REPLACE or STOP: what happens where the file cannot be used

@@ -17,11 +17,17 @@ class RenderFailed(RuntimeError):
 class Session:
     """Owns the native scene and session. Use as a context manager: leaving it stops the threads."""
 
-    def __init__(self, scene: Scene, settings: Settings, lightmap: Lightmap | None = None, built=None):
+    def __init__(
+        self, scene: Scene, settings: Settings, lightmap: Lightmap | None = None, built=None, kept=None, path=()
+    ):
+        """`kept`: tables that a session like this one kept; `path`: Cameras of other frames."""
         self.scene = scene
         try:
             self.native_scene = built or native.build_scene(scene, settings.threads)
             self.native = native.module().Session(self.native_scene, scene.camera, scene.film, settings, lightmap)
+            if kept:
+                self.native.take_over(kept)
+            self.native.look_along(list(path))
         except native.NativeMissing:
             raise
         except (ValueError, RuntimeError) as error:  # bad input, a library that fails

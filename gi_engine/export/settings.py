@@ -93,6 +93,9 @@ def export_settings(scene, view_layer, descriptors: list[dict], integrator: str 
         seed=resolved.seed,
         threads=scene.render.threads if scene.render.threads_mode == "FIXED" else 0,
         parameters=parameters_of(scene, chosen) if chosen else {},
+        keep=own.keep,
+        kept_file=own.kept_file,
+        kept_misfit=own.kept_misfit,
     )
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import bpy
 
+from .. import camera_path, engine
+from ..export import ExportError
 from ..export.settings import copy_from_cycles
 
 
@@ -38,5 +40,22 @@ class GI_OT_follow_cycles(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (GI_OT_copy_from_cycles, GI_OT_follow_cycles)
+class GI_OT_render_along(bpy.types.Operator):
+    """Render the animation, with the cache of its first frame filled for all that the camera will see: nothing is added later that could flicker"""
+
+    bl_idname = "gi_engine.render_along"
+    bl_label = "Render Animation, Filling Ahead"
+
+    def execute(self, context):
+        scene = context.scene
+        frames = list(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+        try:
+            engine.look_ahead(camera_path.collect(context, frames))
+        except ExportError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return bpy.ops.render.render("EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT", animation=True)
+
+
+CLASSES = (GI_OT_render_along, GI_OT_copy_from_cycles, GI_OT_follow_cycles)
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

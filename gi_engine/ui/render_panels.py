@@ -27,6 +27,11 @@ def parameters(scene) -> list[dict]:
     return next((d["parameters"] for d in native.integrators() if d["id"] == chosen), [])
 
 
+def keeps(scene) -> bool:
+    chosen = scene.gi_engine.integrator
+    return any(d["kept_version"] for d in native.integrators() if d["id"] == chosen)
+
+
 def has_any(scene, names) -> bool:
     return any(p["name"] in names for p in parameters(scene))
 
@@ -57,6 +62,25 @@ def matters(own, name: str) -> bool:
     choice, _, item = name.rpartition("_")
     found = own.bl_rna.properties.get(choice)
     return found is None or item.upper() not in found.enum_items or getattr(own, choice) == item.upper()
+
+
+class GI_RENDER_PT_cache(RenderPanel, bpy.types.Panel):
+    bl_label = "Cache"
+    bl_parent_id = "GI_RENDER_PT_integrator"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and keeps(context.scene)
+
+    def draw(self, context):
+        own = context.scene.gi_engine
+        column = columns(self.layout)
+        column.prop(own, "keep")
+        column.prop(own, "kept_file")
+        row = column.row()
+        row.active = bool(own.kept_file)
+        row.prop(own, "kept_misfit")
+        self.layout.operator("gi_engine.render_along", icon="RENDER_ANIMATION")
 
 
 class GI_RENDER_PT_sampling(RenderPanel, bpy.types.Panel):
@@ -246,6 +270,7 @@ class GI_VIEWLAYER_PT_override(Panel, bpy.types.Panel):
 
 CLASSES = (
     GI_RENDER_PT_integrator,
+    GI_RENDER_PT_cache,
     GI_RENDER_PT_sampling,
     GI_RENDER_PT_light_paths,
     GI_RENDER_PT_bounces,

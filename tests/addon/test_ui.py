@@ -87,6 +87,7 @@ def with_nodes(owner):
 @pytest.mark.parametrize("own", [False, True])
 def test_panels_draw_what_exists(scene, own):
     scene.gi_engine.is_own = own
+    scene.gi_engine.integrator = "irradiance_cache"  # which has a panel more
     scene.world = bpy.data.worlds.new("World")
     item = add(scene, "Square", mesh())
     item.data.materials.append(bpy.data.materials.new("Paint"))

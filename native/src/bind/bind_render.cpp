@@ -62,6 +62,7 @@ nb::dict progress_dict(const Session& session) {
   nb::dict d;
   d["passes"] = p.passes;
   d["stage"] = session.log().stage();
+  d["note"] = session.log().note();
   d["samples_per_pixel"] = p.passes;
   d["fraction"] = p.fraction;
   d["seconds"] = p.seconds;
@@ -99,6 +100,25 @@ nb::ndarray<nb::numpy, float> coverage(const Session& session) {
   return nb::ndarray<nb::numpy, float>(texels->data(), {h, w}, owner);
 }
 
+Kept read_kept(nb::dict tables) {
+  Kept kept;
+  for (auto [name, table] : tables) {
+    const auto rows = nb::cast<nb::ndarray<const float, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>>(table);
+    kept[nb::cast<std::string>(name)] = {rows.shape(1), std::vector<float>(rows.data(), rows.data() + rows.size())};
+  }
+  return kept;
+}
+
+nb::dict kept_tables(const Session& session) {
+  nb::dict tables;
+  for (auto& [name, table] : session.kept()) {
+    auto* numbers = new std::vector<float>(table.numbers);
+    nb::capsule owner(numbers, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+    tables[name.c_str()] = nb::ndarray<nb::numpy, float>(numbers->data(), {table.rows(), table.columns}, owner);
+  }
+  return tables;
+}
+
 nb::list describe_integrators() {
   nb::list all;
   for (const Descriptor& d : integrators()) {
@@ -121,6 +141,7 @@ nb::list describe_integrators() {
     }
     nb::dict entry;
     entry["id"] = d.id, entry["label"] = d.label, entry["blurb"] = d.blurb, entry["parameters"] = parameters, entry["bakes"] = d.bakes;
+    entry["kept_version"] = d.kept_version, entry["kept_by_place"] = d.kept_by_place;
     all.append(entry);
   }
   return all;
@@ -169,6 +190,18 @@ void bind_render(nb::module_& m) {
           },
           nb::arg("scene"), nb::arg("camera"), nb::arg("film"), nb::arg("settings"), nb::arg("lightmap") = nb::none(),
           nb::keep_alive<1, 2>(), "Takes scene_data's Camera, Film, Settings and, for a bake, Lightmap. Raises ValueError for bad input.")
+      .def(
+          "take_over", [](Session& s, nb::dict tables) { s.take_over(read_kept(tables)); }, nb::arg("tables"),
+          "Before the start: what kept() of a render by the same integrator was. Raises ValueError.")
+      .def(
+          "look_along",
+          [](Session& s, nb::list cameras) {
+            std::vector<Camera> path;
+            for (nb::handle camera : cameras) path.push_back(read_camera(camera));
+            s.look_along(std::move(path));
+          },
+          nb::arg("cameras"), "Before the start: where the camera will be in other frames.")
+      .def("kept", &kept_tables, "Once ended: what another render of the scene may take over, float32 tables (rows, columns) by name.")
       .def("start", &Session::start)
       .def("wait", &Session::wait, nb::arg("seconds"), nb::call_guard<nb::gil_scoped_release>(), "True once the render has ended.")
       .def("cancel", &Session::cancel)

@@ -42,12 +42,23 @@ class Parameters {
   std::map<std::string, double> values_;
 };
 
+// What an integrator keeps from one render for the next: tables by name, as rows of numbers.
+struct KeptTable {
+  size_t columns = 0;
+  std::vector<float> numbers;
+  size_t rows() const { return columns ? numbers.size() / columns : 0; }
+};
+using Kept = std::map<std::string, KeptTable>;
+
 class Integrator {
  public:
   virtual ~Integrator() = default;
   virtual void prepare(const RenderContext&) {}                               // once per scene: caches, tables
   virtual void render_pass(const RenderContext&, int pass, Film&) = 0;        // adds one estimate of the whole image
   virtual void finish_pass(const RenderContext&, int pass) { (void)pass; }    // learn, merge
+  // For those whose descriptor has a `kept_version`: before the first pass, of the same version; and after the last.
+  virtual void take_over(const Kept&) {}  // throws InputError where that is not what it keeps
+  virtual Kept keep() const { return {}; }
 };
 
 struct Descriptor {
@@ -57,6 +68,10 @@ struct Descriptor {
   std::vector<Parameter> parameters;
   std::unique_ptr<Integrator> (*create)(const Parameters&);
   bool bakes = false;  // whether its paths from the eye may begin on a surface: heeds RenderContext::lightmap
+  // What it keeps for further renders of the scene. The version changes with what the tables hold; 0: nothing is kept.
+  // By place: their rows begin with a position and a normal, so that those near what has changed can be left out.
+  int kept_version = 0;
+  bool kept_by_place = false;
 };
 
 const std::vector<Descriptor>& integrators();

@@ -1,6 +1,7 @@
 // Irradiance caching [Ward 1988]: light from one diffuse surface to another is worked out at few places and interpolated between them
 // [Ward & Heckbert 1992]. Everything else is path traced, and what paths meet behind mirrors and glass uses the cache too.
 // An overture fills the cache from coarse to fine, in waves whose order no thread can change; the passes only read.
+#include "core/check.h"
 #include "core/tally.h"
 #include "integrators/integrator.h"
 #include "transport/camera_path.h"
@@ -16,6 +17,10 @@ constexpr int kSeedStep = 4;                      // the same for deeper levels
 constexpr size_t kLeastWave = 64;                 // records
 constexpr size_t kWaveShare = 8;                  // a wave is at most this part of what is there
 constexpr float kLeastReach = 1.0f;  // pixels
+constexpr double kOvertureShare = 0.5;  // of the time limit, at most
+constexpr double kDeeperShare = 0.25;   // of what remains of that, for each level but the first
+constexpr float kSlack = 1.3f;          // times the error that is let pass where records were taken over, or each frame would add some
+constexpr float kCoarser = 2.0f;        // times the maximum spacing that a record of another frame may hold for
 constexpr uint32_t kSeekSalt = 0x1c5eedu, kGatherSalt = 0x1c6a74u;  // streams of their own
 
 struct CacheSettings {
@@ -34,6 +39,7 @@ struct Place {
   Vec3 position, ng, normal;
   float footprint = 0, spread = 0;  // of the pixel, as it is seen from here on
   int level = 0;
+  float most = kInf;  // a radius beyond which a record is too coarse here
 };
 
 // A path under way. What it finds of luminaires and what of anything else may count differently: luminaires are sampled at every
@@ -71,10 +77,10 @@ class IrradianceCacheIntegrator final : public Integrator {
     });
   }
 
-  void finish_pass(const RenderContext& context, int) override {
-    const double hits = double(hits_.total()), all = hits + double(misses_.total());
-    context.log.set("cache hit rate", all > 0.0 ? hits / all : 1.0);
-  }
+  void finish_pass(const RenderContext& context, int) override;
+
+  void take_over(const Kept& kept) override;
+  Kept keep() const override;
 
  private:
   void trace(const RenderContext& context, const Film& film, const CameraRay& camera, Walk& walk, Sampler& sampler,
@@ -83,9 +89,11 @@ class IrradianceCacheIntegrator final : public Integrator {
 
   void play_overture(const RenderContext& context, Film& film);
   void fill_level(const RenderContext& context, const Film& film, int level);
-  void seek(const RenderContext& context, const Film& film, int x, int y, int level, std::vector<Place>& places) const;
+  void seek(const RenderContext& context, const Film& film, const Camera& eye, int x, int y, int level, std::vector<Place>& places) const;
   void fill(const RenderContext& context, const Film& film, std::vector<Place> places, int level);
   IrradianceRecord gather(const RenderContext& context, const Film& film, const Place& place, uint32_t serial) const;
+  bool is_late(const RenderContext& context) const { return context.time_limit > 0.0 && context.seconds() > level_ends_; }
+  size_t record_count() const;
 
   // Diffuse bounces that a path may still make, and how many of all it has made: its level.
   int most_bounces() const { return std::min(s_.limits.diffuse, s_.limits.total); }
@@ -105,6 +113,9 @@ class IrradianceCacheIntegrator final : public Integrator {
   std::vector<IrradianceCache> caches_;  // by level
   mutable Tally hits_, misses_;       // of the first bounce, while the picture is made
   uint32_t gathered_ = 0;                // records, those included that were not needed in the end
+  std::vector<std::vector<IrradianceRecord>> taken_over_;  // by level
+  float slack_ = 1.0f;
+  double level_ends_ = 0;                // seconds after which no more records are begun, where there is a time limit
 };
 
 // ---------------------------------------------------------------- paths
@@ -214,46 +225,111 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
   }
 }
 
+// ---------------------------------------------------------------- what is kept
+
+std::string name_of_level(size_t level) { return "bounce " + std::to_string(level + 1); }
+
+Kept IrradianceCacheIntegrator::keep() const {
+  Kept kept;
+  for (size_t level = 0; level < caches_.size(); ++level) {
+    const auto& records = caches_[level].records();
+    KeptTable& table = kept[name_of_level(level)];
+    table = {IrradianceRecord::kNumbers, std::vector<float>(records.size() * IrradianceRecord::kNumbers)};
+    for (size_t i = 0; i < records.size(); ++i) records[i].write(&table.numbers[i * IrradianceRecord::kNumbers]);
+  }
+  return kept;
+}
+
+void IrradianceCacheIntegrator::take_over(const Kept& kept) {
+  taken_over_.assign(kMostLevels, {});
+  for (const auto& [name, table] : kept) {
+    size_t level = 0;
+    while (level < kMostLevels && name != name_of_level(level)) ++level;
+    require(level < kMostLevels && table.columns == IrradianceRecord::kNumbers, "'" + name + "' is no table of irradiance records");
+    for (size_t i = 0; i < table.rows(); ++i) {
+      const IrradianceRecord r = IrradianceRecord::read(&table.numbers[i * table.columns]);
+      bool good = r.radius > 0.0f && r.least >= 0.0f && r.reach > 0.0f && std::isfinite(r.radius) && is_finite(r.irradiance) &&
+                  std::isfinite(dot(r.position, r.position)) && std::abs(length_squared(r.normal) - 1.0f) < 1e-3f;
+      for (int axis = 0; axis < 3; ++axis) good = good && is_finite(r.translation[axis]) && is_finite(r.lateral[axis]);
+      require(good, "'" + name + "', row " + std::to_string(i) + ": no irradiance record");
+      taken_over_[level].push_back(r);
+    }
+  }
+}
+
+size_t IrradianceCacheIntegrator::record_count() const {
+  size_t count = 0;
+  for (const IrradianceCache& cache : caches_) count += cache.records().size();
+  return count;
+}
+
+void IrradianceCacheIntegrator::finish_pass(const RenderContext& context, int) {
+  const double hits = double(hits_.total()), all = hits + double(misses_.total());
+  const double rate = all > 0.0 ? hits / all : 1.0;
+  context.log.set("cache hit rate", rate);
+  char text[64];
+  std::snprintf(text, sizeof text, "%zu records, %.1f %% hits", record_count(), 100.0 * rate);
+  context.log.note(text);
+}
+
 // ---------------------------------------------------------------- overture
 
 void IrradianceCacheIntegrator::play_overture(const RenderContext& context, Film& film) {
-  for (int level = 0; level < std::max(level_count(), 1); ++level) caches_.emplace_back(context.scene.bounds(), error_at(level));
+  for (int level = 0; level < std::max(level_count(), 1); ++level) {
+    caches_.emplace_back(context.scene.bounds(), error_at(level));
+    if (!taken_over_.empty())
+      for (const IrradianceRecord& record : taken_over_[size_t(level)]) caches_.back().insert(record);
+  }
+  taken_over_.clear();
+  const size_t before = record_count();
+  gathered_ = uint32_t(before);
+  if (before > 0) slack_ = kSlack;
   // Deepest first: records of a level are made with the help of those below.
   for (int level = level_count() - 1; level >= 0 && !context.cancelled; --level) {
+    const double seconds = context.seconds(), left = std::max(kOvertureShare * context.time_limit - seconds, 0.0);
+    level_ends_ = seconds + (level > 0 ? kDeeperShare : 1.0) * left;
     fill_level(context, film, level);
     caches_[size_t(level)].freeze();
   }
-  size_t records = 0, bytes = 0;
-  for (const IrradianceCache& cache : caches_) records += cache.records().size(), bytes += cache.memory_bytes();
+  const size_t records = record_count();
+  size_t bytes = 0;
+  for (const IrradianceCache& cache : caches_) bytes += cache.memory_bytes();
   context.log.stage("");
   context.log.say(std::to_string(records) + " records in the irradiance cache, " + std::to_string(caches_[0].records().size()) +
-                  " of the first bounce, " + std::to_string(bytes >> 20) + " MiB");
+                  " of the first bounce, " + (before ? std::to_string(before) + " taken over, " : "") + std::to_string(bytes >> 20) +
+                  " MiB");
+  context.log.set("cache overture seconds", context.seconds());
   context.log.set("cache records", double(records));
   context.log.set("cache records of the first bounce", double(caches_[0].records().size()));
-  context.log.set("cache records worked out", double(gathered_));
+  context.log.set("cache records taken over", double(before));
+  context.log.set("cache records worked out", double(gathered_) - double(before));
   context.log.set("cache bytes", double(bytes));
 }
 
 // From coarse to fine over the picture; pixels of one step in an order without order, so that a wave's are far apart.
 void IrradianceCacheIntegrator::fill_level(const RenderContext& context, const Film& film, int level) {
   struct Pixel {
-    int x, y;
+    int x, y, eye;
   };
   const FilmSpec& spec = film.spec();
   for (int step = kCoarsest; step >= (level == 0 ? kFinest : kSeedStep) && !context.cancelled; step /= 2) {
     std::vector<Pixel> pixels;
-    for (int y = step / 2; y < spec.region_height(); y += step)
-      for (int x = step / 2; x < spec.region_width(); x += step) pixels.push_back({spec.x0 + x, spec.y0 + y});
+    for (int eye = -1; eye < int(context.path.size()); ++eye)
+      for (int y = step / 2; y < spec.region_height(); y += step)
+        for (int x = step / 2; x < spec.region_width(); x += step) pixels.push_back({spec.x0 + x, spec.y0 + y, eye});
     const auto key = [](const Pixel& p) { return hash_combine(uint32_t(p.x), uint32_t(p.y)); };
     std::sort(pixels.begin(), pixels.end(), [&](const Pixel& a, const Pixel& b) {
       const uint32_t ka = key(a), kb = key(b);
-      return ka != kb ? ka < kb : std::pair(a.y, a.x) < std::pair(b.y, b.x);
+      return ka != kb ? ka < kb : std::tuple(a.y, a.x, a.eye) < std::tuple(b.y, b.x, b.eye);
     });
     constexpr int kBatch = 64;
     std::vector<std::vector<Place>> found((pixels.size() + kBatch - 1) / kBatch);
     context.pool.for_each(int(found.size()), context.cancelled, [&](int batch) {
       const size_t end = std::min(pixels.size(), size_t(batch + 1) * kBatch);
-      for (size_t i = size_t(batch) * kBatch; i < end; ++i) seek(context, film, pixels[i].x, pixels[i].y, level, found[size_t(batch)]);
+      for (size_t i = size_t(batch) * kBatch; i < end && !is_late(context); ++i) {
+        const Pixel& p = pixels[i];
+        seek(context, film, p.eye < 0 ? context.camera : context.path[size_t(p.eye)], p.x, p.y, level, found[size_t(batch)]);
+      }
     });
     std::vector<Place> places;
     for (const auto& batch : found) places.insert(places.end(), batch.begin(), batch.end());
@@ -262,12 +338,12 @@ void IrradianceCacheIntegrator::fill_level(const RenderContext& context, const F
 }
 
 // Diffuse surfaces of a level along one path through a pixel that the cache does not cover.
-void IrradianceCacheIntegrator::seek(const RenderContext& context, const Film& film, int x, int y, int level,
+void IrradianceCacheIntegrator::seek(const RenderContext& context, const Film& film, const Camera& eye, int x, int y, int level,
                                      std::vector<Place>& places) const {
   const FilmSpec& spec = film.spec();
   Sampler sampler(hash_combine(context.seed, kSeekSalt + uint32_t(level)), uint32_t(y) * uint32_t(spec.width) + uint32_t(x), 0);
   const Vec2 pixel{1.0f / float(spec.width), 1.0f / float(spec.height)};
-  const CameraRay camera = context.camera.sample({(float(x) + 0.5f) * pixel.x, (float(y) + 0.5f) * pixel.y}, pixel, sampler.next_2d());
+  const CameraRay camera = eye.sample({(float(x) + 0.5f) * pixel.x, (float(y) + 0.5f) * pixel.y}, pixel, sampler.next_2d());
   Bsdf bsdf;
   CameraPath path(camera);
   PixelSample nowhere;
@@ -282,8 +358,9 @@ void IrradianceCacheIntegrator::seek(const RenderContext& context, const Film& f
       for (const uint8_t side : {kReflection, kTransmission}) {
         if (is_black(bsdf.diffuse_albedo(point.wo, side))) continue;
         const float sign = side == kReflection ? 1.0f : -1.0f;
-        const Place place{point.position, point.ng * sign, point.ns * sign, point.footprint, camera.spread, level};
-        if (!caches_[size_t(level)].covers(place.position, place.normal)) places.push_back(place);
+        const float most = kCoarser * s_.max_spacing * 2.0f * point.footprint / error_at(level);
+        const Place place{point.position, point.ng * sign, point.ns * sign, point.footprint, camera.spread, level, most};
+        if (!caches_[size_t(level)].covers(place.position, place.normal, most, slack_)) places.push_back(place);
       }
     }
     const float u_lobe = sampler.next_1d();
@@ -305,23 +382,24 @@ void IrradianceCacheIntegrator::fill(const RenderContext& context, const Film& f
     std::vector<uint8_t> covered(places.size(), 0);
     context.pool.for_each(int((places.size() + kBatch - 1) / kBatch), context.cancelled, [&](int batch) {
       const size_t end = std::min(places.size(), size_t(batch + 1) * kBatch);
-      for (size_t i = size_t(batch) * kBatch; i < end; ++i) covered[i] = cache.covers(places[i].position, places[i].normal);
+      for (size_t i = size_t(batch) * kBatch; i < end; ++i) covered[i] = cache.covers(places[i].position, places[i].normal, places[i].most);
     });
     std::vector<Place> left;
     for (size_t i = 0; i < places.size(); ++i)
       if (!covered[i]) left.push_back(places[i]);
     places = std::move(left);
-    if (places.empty()) return;
+    if (places.empty() || is_late(context)) return;
 
     context.log.stage("irradiance cache, bounce " + std::to_string(level + 1) + ", " + std::to_string(cache.records().size()) + " records");
     const size_t count = std::min(places.size(), std::max(kLeastWave, cache.records().size() / kWaveShare));
-    std::vector<IrradianceRecord> made(count);
-    context.pool.for_each(int(count), context.cancelled,
-                          [&](int i) { made[size_t(i)] = gather(context, film, places[size_t(i)], gathered_ + uint32_t(i)); });
-    if (context.cancelled) return;
+    std::vector<std::optional<IrradianceRecord>> made(count);
+    context.pool.for_each(int(count), context.cancelled, [&](int i) {
+      if (!is_late(context)) made[size_t(i)] = gather(context, film, places[size_t(i)], gathered_ + uint32_t(i));
+    });
+    if (context.cancelled) return;  // those under way have lost rays
     gathered_ += uint32_t(count);
-    for (const IrradianceRecord& record : made)
-      if (!cache.covers(record.position, record.normal)) cache.insert(record);
+    for (size_t i = 0; i < count; ++i)
+      if (made[i] && !cache.covers(places[i].position, places[i].normal, places[i].most)) cache.insert(*made[i]);
     places.erase(places.begin(), places.begin() + std::ptrdiff_t(count));
   }
 }
@@ -396,7 +474,10 @@ const Descriptor& irradiance_cache_descriptor() {
           {"filter_glossy", "Filter Glossy", Kind::kFloat, 0, 0, 100,
            "Makes glossy surfaces rougher where unlikely paths see them: less noise, blurred caustics. 0 is off"},
       },
-      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<IrradianceCacheIntegrator>(p); }};
+      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<IrradianceCacheIntegrator>(p); },
+      /*bakes=*/false,
+      /*kept_version=*/1,
+      /*kept_by_place=*/true};
   return descriptor;
 }
 

@@ -37,6 +37,21 @@ void Session::start() {
   thread_ = std::thread([this] { run(); });
 }
 
+void Session::take_over(const Kept& kept) {
+  require(!thread_.joinable(), "the session was started already");
+  integrator_->take_over(kept);
+}
+
+void Session::look_along(std::vector<Camera> path) {
+  require(!thread_.joinable(), "the session was started already");
+  path_ = std::move(path);
+}
+
+Kept Session::kept() const {
+  require(progress().done, "the session has not ended");
+  return integrator_->keep();
+}
+
 void Session::cancel() { cancelled_ = true; }
 
 bool Session::wait(double seconds) {
@@ -55,9 +70,20 @@ void Session::run() {
     ThreadPool pool(settings_.threads);
     scene_.resources().camera = &camera_;
     const LightSet lights(scene_);
-    const RenderContext context{scene_, lights, camera_, pool, settings_.seed, cancelled_, tiles_done_, log_, lightmap_.get()};
-    integrator_->prepare(context);
+    const RenderContext context{scene_,
+                                lights,
+                                camera_,
+                                pool,
+                                settings_.seed,
+                                cancelled_,
+                                tiles_done_,
+                                log_,
+                                lightmap_.get(),
+                                std::chrono::steady_clock::now(),
+                                settings_.time_limit,
+                                path_};
     const double start = now();
+    integrator_->prepare(context);
     float noise = kInf;
     int next_check = 16;  // passes; fewer say nothing of noise
     for (int pass = 0; !cancelled_; ++pass) {

@@ -40,12 +40,16 @@ class Session {
   Session(const Scene& scene, const Camera& camera, FilmSpec film, RenderSettings settings,
           const std::optional<LightmapSpec>& lightmap = {});
   ~Session();  // cancels and waits
+  // Before start(): what a render by the same integrator kept; where the camera will be in other frames. Throws InputError.
+  void take_over(const Kept& kept);
+  void look_along(std::vector<Camera> path);
   void start();
   bool wait(double seconds);  // true once it has ended
   void cancel();
   Progress progress() const;
   const Film& film() const { return film_; }
   const Log& log() const { return log_; }
+  Kept kept() const;  // once it has ended
   const Lightmap* lightmap() const { return lightmap_.get(); }
 
  private:
@@ -54,6 +58,7 @@ class Session {
 
   const Scene& scene_;
   Camera camera_;
+  std::vector<Camera> path_;
   Film film_;
   std::unique_ptr<const Lightmap> lightmap_;
   RenderSettings settings_;

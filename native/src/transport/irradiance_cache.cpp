@@ -28,6 +28,31 @@ float clamped(const IrradianceRecord& record, const IrradianceRecord& other) {
 
 }  // namespace
 
+// A cursor over a row: each call writes or reads what comes next.
+void IrradianceRecord::write(float* row) const {
+  const auto put = [&](const auto& v) {
+    for (int k = 0; k < 3; ++k) *row++ = v[k];
+  };
+  put(position), put(normal);
+  *row++ = radius, *row++ = least, *row++ = reach;
+  put(irradiance);
+  for (const Rgb& c : translation) put(c);
+  for (const Rgb& c : lateral) put(c);
+}
+
+IrradianceRecord IrradianceRecord::read(const float* row) {
+  IrradianceRecord r;
+  const auto get = [&](auto& v) {
+    for (int k = 0; k < 3; ++k) v[k] = *row++;
+  };
+  get(r.position), get(r.normal);
+  r.radius = *row++, r.least = *row++, r.reach = *row++;
+  get(r.irradiance);
+  for (Rgb& c : r.translation) get(c);
+  for (Rgb& c : r.lateral) get(c);
+  return r;
+}
+
 IrradianceCache::IrradianceCache(Bounds bounds, float error) : error_(error) {
   const Vec3 extent = bounds.empty() ? Vec3{1, 1, 1} : bounds.extent();
   side_ = 1.01f * std::max({extent.x, extent.y, extent.z, 1e-3f});
@@ -86,11 +111,12 @@ std::optional<float> IrradianceCache::error_of(const Hot& hot, float radius, Vec
 // [Ward & Heckbert 1992, eq. 4], less a constant so that a record's weight ends at 0 where it does not hold any more.
 float IrradianceCache::weight_of(float error) const { return 1.0f / std::max(error, kEven * error_) - 1.0f / (kOverlap * error_); }
 
-bool IrradianceCache::covers(Vec3 position, Vec3 normal) const {
+bool IrradianceCache::covers(Vec3 position, Vec3 normal, float most, float slack) const {
   bool covered = false;
+  const float most_error = slack * error_;
   for_each_at(position, [&](const Hot& hot) {
-    const auto error = error_of(hot, hot.cover, position, normal, error_);
-    covered = covered || (error && *error < error_);
+    const auto error = error_of(hot, std::min(hot.cover, most), position, normal, most_error);
+    covered = covered || (error && *error < most_error);
   });
   return covered;
 }

@@ -17,6 +17,11 @@ struct IrradianceRecord {
   Rgb translation[3];   // ∂E/∂x, ∂E/∂y, ∂E/∂z for moves in the tangent plane
   Rgb lateral[3];       // the part of vector irradiance in the tangent plane: how E changes as the normal turns
 
+  // As a row of a table; `reach` may be infinite.
+  static constexpr size_t kNumbers = 30;
+  void write(float* row) const;
+  static IrradianceRecord read(const float* row);
+
   // What it says of another place, and of the normal `bumped`; `turned` is the cosine between that and the surface's own there.
   Rgb at(Vec3 place, Vec3 bumped, float turned) const {
     const Vec3 d = place - position;
@@ -38,8 +43,8 @@ class IrradianceCache {
 
   // Clamps the radius by those of its neighbours, and theirs by it.
   void insert(IrradianceRecord record);
-  // Whether a record of an error below α holds here.
-  bool covers(Vec3 position, Vec3 normal) const;
+  // Whether a record of an error below `slack` α holds here; radii beyond `most` are taken for that.
+  bool covers(Vec3 position, Vec3 normal, float most = kInf, float slack = 1.0f) const;
   // The weighted mean of all that hold to an error of kOverlap α; where none does, of those that are near enough but on a surface bent
   // otherwise. `bumped`: the normal that irradiance is for, `normal` the surface's.
   std::optional<CachedIrradiance> find(Vec3 position, Vec3 normal, Vec3 bumped) const;

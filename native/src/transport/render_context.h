@@ -1,7 +1,9 @@
 // What everything that follows light is given: the scene, its lights, the camera, threads. Leaves out the film.
 #pragma once
 #include <atomic>
+#include <chrono>
 #include <mutex>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,6 +28,15 @@ class Log {
       if (name == figure) return void(old = value);
     figures_.emplace_back(figure, value);
   }
+  // In a few words, for the line over the picture.
+  void note(std::string text) {
+    const std::lock_guard lock(mutex_);
+    note_ = std::move(text);
+  }
+  std::string note() const {
+    const std::lock_guard lock(mutex_);
+    return note_;
+  }
   // What is being done while no pass is under way yet; empty: nothing of the kind.
   void stage(std::string text) {
     const std::lock_guard lock(mutex_);
@@ -47,7 +58,7 @@ class Log {
  private:
   mutable std::mutex mutex_;
   std::vector<std::string> texts_;
-  std::string stage_;
+  std::string stage_, note_;
   std::vector<std::pair<std::string, double>> figures_;
 };
 
@@ -61,6 +72,11 @@ struct RenderContext {
   std::atomic<int>& tiles_done;  // of the pass under way
   Log& log;
   const Lightmap* lightmap = nullptr;  // in a bake: takes the camera's place
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+  double time_limit = 0;               // seconds from `start`; 0: none
+  std::span<const Camera> path = {};   // where the camera will be in other frames, which what is kept may serve as well
+
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); }
 };
 
 }  // namespace gi
