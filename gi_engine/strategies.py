@@ -20,6 +20,18 @@ from .session import Session
 NEEDED = {"only_s", "only_t", "weighted"}
 LONGEST = 8  # vertices of the paths that are shown, luminaire and lens included
 EDGE = 2  # pixels between the pictures of a sheet
+INK = 0.6  # scene-linear
+# Five rows of three pixels each, top first, as octal digits: Blender offers no font to Python that would do without its window.
+GLYPHS = {
+    **dict(
+        zip(
+            "0123456789",
+            (0o75557, 0o26227, 0o71747, 0o71717, 0o55711, 0o74717, 0o74757, 0o71244, 0o75757, 0o75717),
+            strict=True,
+        )
+    ),
+    **{"s": 0o34216, "t": 0o27223, "x": 0o05250, "/": 0o11244},
+}
 INDEX = "strategies.json"
 
 
@@ -125,17 +137,45 @@ def brightenings(images: dict) -> dict[int, float]:
     return {n: 2.0 ** round(math.log2(most / mean)) if mean > 1e-6 * most else 1.0 for n, mean in rows.items()}
 
 
+def label(text: str, scale: int) -> np.ndarray:
+    """(5, 4 · characters) pixels of 0 and INK, times `scale`, row 0 at the bottom."""
+    canvas = np.zeros((5, 4 * len(text)), np.float32)
+    for i, character in enumerate(text):
+        bits = GLYPHS.get(character, 0)
+        for pixel in range(15):
+            canvas[pixel // 3, 4 * i + 2 - pixel % 3] = INK * (bits >> pixel & 1)
+    return np.kron(canvas, np.ones((scale, scale), np.float32))
+
+
+def factor_name(factor: float) -> str:
+    return f"x{factor:.0f}" if factor >= 1 else f"x1/{1 / factor:.0f}"
+
+
 def sheet(pictures: dict, brightening: dict[int, float]) -> np.ndarray:
-    """A row for each number of vertices, short paths on top; in a row, more vertices from the light towards the right."""
+    """A row for each number of vertices, short paths on top; in a row, more vertices from the light towards the right. Over each
+    picture its s and t, left of each row what it is brightened by."""
     height, width, _ = next(iter(pictures.values())).shape
     lengths = sorted(brightening)
     columns = lengths[-1]
-    canvas = np.zeros((len(lengths) * (height + EDGE) + EDGE, columns * (width + EDGE) + EDGE, 3), np.float32)
+    scale = max(1, width // 48)
+    strip = 5 * scale + 2 * EDGE
+    margin = 4 * scale * max(len(factor_name(f)) for f in brightening.values()) + 2 * EDGE
+    pitch_x, pitch_y = width + EDGE, height + strip
+    canvas = np.zeros((len(lengths) * pitch_y + EDGE, max(columns * pitch_x, margin) + margin, 3), np.float32)
+
+    def write(text: str, x: int, y: int) -> None:
+        pixels = label(text, scale)
+        there = canvas[y : y + pixels.shape[0], x : x + pixels.shape[1]]
+        there += pixels[: there.shape[0], : there.shape[1], None]
+
     for (s, t), pixels in pictures.items():
         row = len(lengths) - 1 - lengths.index(s + t)  # row 0 of the canvas is at the bottom
-        x = EDGE + s * (width + EDGE) + (columns - s - t) * (width + EDGE) // 2
-        y = EDGE + row * (height + EDGE)
+        x = margin + s * pitch_x + (columns - s - t) * pitch_x // 2
+        y = EDGE + row * pitch_y
         canvas[y : y + height, x : x + width] = pixels * brightening[s + t]
+        write(f"s{s} t{t}", x, y + height + EDGE)
+        if s == 0:
+            write(factor_name(brightening[s + t]), EDGE, y + (height - 5 * scale) // 2)
     return canvas
 
 

@@ -22,6 +22,7 @@ class GI_OT_render_strategies(bpy.types.Operator):
     directory: bpy.props.StringProperty(subtype="DIR_PATH")
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
     running = False  # one at a time
+    session = timer = None
 
     @classmethod
     def poll(cls, context):
@@ -82,8 +83,9 @@ class GI_OT_render_strategies(bpy.types.Operator):
         return self.finish(self.pyramid.warnings, len(self.pyramid.images))
 
     def cancel(self, context) -> None:
-        """By Esc, or by Blender, which opens another file or closes the window."""
-        self.end(context)
+        """By Esc, or by Blender: no folder is chosen, another file is opened, the window is closed."""
+        if self.timer is not None:
+            self.end(context)
 
     def end(self, context) -> None:
         type(self).running = False

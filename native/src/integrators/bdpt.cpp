@@ -22,15 +22,19 @@ struct Strategies {
   }
 };
 
-// The light subpaths of a tile, one for each pixel, and which of them each pixel's eye vertices may be joined to: those of the pixels on
-// a lattice that it is on too, so that neighbours have different ones.
+// The light subpaths of a tile, one for each pixel, and which of them each pixel's eye vertices may be joined to: those of its group.
+// The pixels of a square of 4 x 4 are of a group each, shuffled anew for each square and pass: neighbours differ, and no pattern stays.
 struct TileLight {
-  static constexpr int kLattices = 16;
+  static constexpr int kGroups = 16;
   LightVertices vertices;
-  LightChoice choices[kLattices];
-  int counts[kLattices];  // of subpaths
-  int slope = 4;          // of the lattices, another for each tile and pass, so that no pattern stays
-  size_t lattice(int x, int y) const { return size_t(x + slope * y) % kLattices; }
+  LightChoice choices[kGroups];
+  int counts[kGroups];  // of subpaths
+  uint32_t key = 0;     // of the pass
+
+  size_t group(int x, int y) const {
+    const uint32_t h = hash_combine(key, uint32_t(y / 4) << 16 | uint32_t(x / 4)), place = uint32_t(y % 4 * 4 + x % 4);
+    return ((place ^ (h & 15)) * ((h >> 4) | 1) + (h >> 8)) & 15;
+  }
 };
 
 struct EyeVertex {
@@ -74,7 +78,7 @@ class BdptIntegrator final : public Integrator {
     };
     const auto from_eye = [&](const CameraRay& camera, Sampler& sampler, PixelSample& result, int x, int y) {
       const TileLight& light = tile_light();
-      trace(context, film, camera, light, light.lattice(x, y), sampler, result);
+      trace(context, film, camera, light, light.group(x, y), sampler, result);
     };
     for_each_tile(context, pass, film, from_light, from_eye);
     film.end_splats(!context.cancelled);
@@ -110,20 +114,19 @@ class BdptIntegrator final : public Integrator {
   // The light subpaths of a tile.
   void shine(const RenderContext& context, int pass, Film& film, const Tile& tile, TileLight& light) const {
     const FilmSpec& spec = film.spec();
-    constexpr int kSlopes[] = {4, 12, 6, 10};  // points of the same lattice are far apart
-    light.slope = kSlopes[hash_combine(hash_combine(uint32_t(tile.x0), uint32_t(tile.y0)), uint32_t(pass)) & 3];
+    light.key = hash_combine(context.seed, uint32_t(pass));
     light.vertices.clear();
     for (LightChoice& choice : light.choices) choice.clear();
-    std::fill_n(light.counts, TileLight::kLattices, 0);
+    std::fill_n(light.counts, TileLight::kGroups, 0);
     for (int y = tile.y0; y < tile.y1; ++y) {
       for (int x = tile.x0; x < tile.x1; ++x) {
         const uint32_t pixel = uint32_t(spec.y0 + y) * uint32_t(spec.width) + uint32_t(spec.x0 + x);
         Sampler sampler = light_sampler(context, pass, spec.width * spec.height, pixel);
-        const size_t first = light.vertices.count(), lattice = light.lattice(x, y);
+        const size_t first = light.vertices.count(), group = light.group(x, y);
         trace_from_light(context, s_, sampler, light.vertices);
-        ++light.counts[lattice];
+        ++light.counts[group];
         for (size_t k = first; s_.limits.total > 0 && k < light.vertices.count(); ++k)
-          if (strategies_.shows(light.vertices[k].s())) light.choices[lattice].add(light.vertices[k], uint32_t(k));
+          if (strategies_.shows(light.vertices[k].s())) light.choices[group].add(light.vertices[k], uint32_t(k));
         splat(context, film, sampler, light.vertices, first);
       }
     }
@@ -153,7 +156,7 @@ class BdptIntegrator final : public Integrator {
     }
   }
 
-  void trace(const RenderContext& context, const Film& film, const CameraRay& camera, const TileLight& light, size_t lattice,
+  void trace(const RenderContext& context, const Film& film, const CameraRay& camera, const TileLight& light, size_t group,
              Sampler& sampler, PixelSample& result) const {
     const Heuristic h = s_.heuristic;
     const float pixels = float(film.spec().width * film.spec().height);
@@ -217,10 +220,10 @@ class BdptIntegrator final : public Integrator {
       if (may_scatter && !bsdf.is_delta() && !merging_.alone) {
         add(direct_light(context, here, u_light_choice, u_light), path.state.depth + 1);
         const auto join = [&](uint32_t k, float times, float u_left) {
-          add(connect(context, here, light.vertices[k], u_left) / (times * float(light.counts[lattice])), path.state.depth + 2);
+          add(connect(context, here, light.vertices[k], u_left) / (times * float(light.counts[group])), path.state.depth + 2);
         };
         if (path.state.depth < s_.limits.total)
-          light.choices[lattice].draw(point.position, point.ng, bsdf.flags() & kTransmission, connections_, u_joined, join);
+          light.choices[group].draw(point.position, point.ng, bsdf.flags() & kTransmission, connections_, u_joined, join);
       }
 
       // Draw the next direction.
