@@ -26,6 +26,9 @@ class Pass:
 DENOISING = "cycles.denoising_store_passes"
 SAMPLE_COUNT = "cycles.pass_debug_sample_count"
 
+TERMS = ("Direct", "Specular", "Caustic", "Global")  # which photon mapping's picture is the sum of
+PHOTONS = ("Photons", "Photon Density", "Photon Radius")
+
 PASSES = (
     Pass("Combined", "Combined", "RGBA", "COLOR"),
     Pass("Depth", "Depth", "Z", "VALUE", ("use_pass_z",)),
@@ -40,6 +43,8 @@ PASSES = (
     Pass("Denoising Normal", "Denoising Normal", "XYZ", "VECTOR", (DENOISING,)),
     Pass("Debug Sample Count", "Debug Sample Count", "X", "VALUE", ("gi_engine.use_pass_sample_count", SAMPLE_COUNT)),
     Pass("Cache Samples", "Cache Samples", "X", "VALUE", ("gi_engine.use_pass_cache_samples",)),
+    *(Pass(name, name, "RGB", "COLOR", ("gi_engine.use_pass_terms",)) for name in TERMS),
+    *(Pass(name, name, "X", "VALUE", ("gi_engine.use_pass_photons",)) for name in PHOTONS),
 )
 
 

@@ -161,6 +161,15 @@ class GI_PG_view_layer(bpy.types.PropertyGroup):
     use_pass_cache_samples: BoolProperty(
         name="Cache Samples", description="Irradiance caching: where the records lie that light is interpolated between"
     )
+    use_pass_terms: BoolProperty(
+        name="Terms",
+        description="Photon mapping: Direct, Specular, Caustic and Global, which the picture is the sum of",
+    )
+    use_pass_photons: BoolProperty(
+        name="Photons",
+        description="Photon mapping: the photons in each pixel, how many lie on a square metre, and the radius in metres "
+        "within which they are averaged",
+    )
 
 
 _registered: list[type] = []

@@ -242,12 +242,14 @@ class GI_VIEWLAYER_PT_passes(Panel, bpy.types.Panel):
             column.prop(layer, name)
         column.prop(layer.gi_engine, "use_pass_sample_count")
         column.prop(layer.gi_engine, "use_pass_cache_samples")
+        column.prop(layer.gi_engine, "use_pass_photons")
         column = columns(self.layout, heading="Indexes")
         for name in ("use_pass_object_index", "use_pass_material_index"):
             column.prop(layer, name)
         column = columns(self.layout, heading="Light")
         for name in ("use_pass_emit", "use_pass_environment"):
             column.prop(layer, name)
+        column.prop(layer.gi_engine, "use_pass_terms")
         column.prop(layer.gi_engine, "use_pass_albedo")
 
 

@@ -167,3 +167,73 @@ def test_photons_agree_with_path_tracing(way, name):
     assert (off < 9 * error + BLUR * truth.mean(0)).all()
     whole = np.sqrt((truth.mean(1).var(0, ddof=1) + found.mean(1).var(0, ddof=1)) / SEEDS)
     assert (np.abs(truth.mean((0, 1)) - found.mean((0, 1))) < 5 * whole + 0.5 * BLUR * truth.mean((0, 1))).all()
+
+
+@pytest.mark.parametrize("name", ["mirror and diffuse", "clear glass", "gloss", "rough glass"])
+@pytest.mark.parametrize("way", ["progressive", "gathered"])
+def test_without_caustics_they_agree_with_path_tracing(way, name):
+    """Blender's switches: what diffuse surfaces see of others loses its gloss and glass."""
+    integrator, parameters = WAYS[way]
+    off = {"caustics_reflective": False, "caustics_refractive": False}
+    scene = (SCENES | CAUSTICS)[name]
+    truth = blocks_of(scene, "path", 64, **off)
+    found = blocks_of(scene, integrator, 16, **off, **(parameters | ({"radius": 1} if way == "progressive" else {})))
+    whole = np.sqrt((truth.mean(1).var(0, ddof=1) + found.mean(1).var(0, ddof=1)) / SEEDS)
+    assert (np.abs(truth.mean((0, 1)) - found.mean((0, 1))) < 5 * whole + 0.5 * BLUR * truth.mean((0, 1))).all()
+    assert (np.abs(blocks_of(scene, "path", 64).mean((0, 1)) - truth.mean((0, 1))) > 5 * whole).any()  # it matters
+
+
+def terms(scene, position, direction, width=0.02, **options):
+    """The picture and the terms that it is the sum of, first channels."""
+    names = ["Combined", "Direct", "Specular", "Caustic", "Global"]
+    half = width / 2
+    scene.camera = sd.Camera("camera", "ORTHO", looking(position, direction), (-half, half, -half, half), 0.0, 1e6)
+    scene.film = sd.Film(16, 16, filter="BOX", filter_width=1.0, passes=names)
+    settings = sd.Settings("photon_map", 32, threads=2, parameters={**BOUNCES, **WAYS["gathered"][1], **options})
+    with Session(scene, settings) as session:
+        while not session.wait():
+            pass
+        return [session.read(name)[..., 0].astype(np.float64) for name in names]
+
+
+def test_terms_make_the_picture():
+    scene = CAUSTICS["mirror and diffuse"]()
+    picture, *parts = terms(scene, (0, 0, 0.9), (0.2, 0.3, -1), width=1.5)
+    assert all(part.mean() > 1e-3 for part in parts)
+    np.testing.assert_allclose(sum(parts), picture, rtol=1e-4, atol=1e-6)
+
+
+def test_the_caustic_term_is_what_mirrors_throw():
+    """The floor beside a mirror: what comes straight, 10 cos θ / r² = 2, is the direct term; the rest is the mirror's."""
+    floor = quad((0, -8, 0), (16, -8, 0), (16, 8, 0), (0, 8, 0))
+    mirror = quad((0, -16, 0), (0, 16, 0), (0, 16, 16), (0, -16, 16))
+    light = lamp("POINT", (40 * math.pi,) * 3, matrix=matrix((1, 0, 2)))
+    scene = scene_of((floor, surface(1.0)), (mirror, shiny(0.0)), lights=[light])
+    direct = 10 * 2 / (0.5**2 + 2**2) ** 1.5
+    for without, caustic in ((True, 0.0), (False, 2.892147 - direct)):
+        _, *parts = terms(
+            scene, (1.5, 0, 1), (0, 0, -1), width=0.1, caustic_photons=400_000, caustics_reflective=not without
+        )
+        found = [math.pi * part.mean() for part in parts]
+        np.testing.assert_allclose(found, [direct, 0, caustic, 0], rtol=0.06, atol=1e-6)
+
+
+def test_photons_are_shown():
+    """A lamp in the middle of a sphere: as many photons on each square metre, and a disc of the neighbours' number."""
+    scene = scene_of((sphere(rings=32), surface(0.5)), lights=[lamp("POINT", (1.0,) * 3, matrix=matrix())])
+    names = ["Combined", "Photons", "Photon Density", "Photon Radius"]
+    scene.camera = sd.Camera("camera", "ORTHO", looking((0, 0, 0), (0.5, 0.3, 0.7)), (-0.2, 0.2, -0.2, 0.2), 0.0, 1e6)
+    scene.film = sd.Film(16, 16, filter="BOX", filter_width=1.0, passes=names)
+    settings = sd.Settings(
+        "photon_map", 8, threads=2, parameters={**BOUNCES, "global_photons": 50_000, "global_count": 50}
+    )
+    with Session(scene, settings) as session:
+        while not session.wait():
+            pass
+        stored = session.native.figures()["global photons"]
+        photons, density, radius = (session.read(name)[..., 0].astype(np.float64) for name in names[1:])
+    truth = stored / (4 * math.pi)
+    assert density.mean() == pytest.approx(truth, rel=0.2)  # photons are aimed, a little
+    assert 50 / (math.pi * radius.mean() ** 2) == pytest.approx(truth, rel=0.2)
+    disc = math.pi * (0.2 / 16) ** 2
+    assert photons.mean() == pytest.approx(truth * disc, rel=0.4)

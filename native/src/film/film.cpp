@@ -1,6 +1,7 @@
 // Accumulating and reading the film.
 #include "film/film.h"
 
+#include <algorithm>
 #include <numeric>
 
 #include "core/check.h"
@@ -28,6 +29,11 @@ void add_combined(const PixelSample& s, float exposure, float* sum) {  // known 
   sum[0] += c.r(), sum[1] += c.g(), sum[2] += c.b(), sum[3] += s.alpha;
 }
 
+template <LightTerm term>
+void add_term(const PixelSample& s, float exposure, float* sum) {
+  add_rgb(s.terms[term] * exposure, sum);
+}
+
 const PassRule kPassRules[] = {
     {"Combined", 4, Keep::kLight, add_combined},
     {"Depth", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { add_number(s.depth, o); }},
@@ -39,6 +45,13 @@ const PassRule kPassRules[] = {
     {"Object Index", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { add_number(s.object_index, o); }},
     {"Material Index", 1, Keep::kFirst, [](const PixelSample& s, float, float* o) { add_number(s.material_index, o); }},
     {"Cache Samples", 1, Keep::kMean, [](const PixelSample& s, float, float* o) { add_number(s.cache_record, o); }},
+    {"Photons", 1, Keep::kMean, [](const PixelSample& s, float, float* o) { add_number(s.photons, o); }},
+    {"Photon Density", 1, Keep::kMean, [](const PixelSample& s, float, float* o) { add_number(s.photon_density, o); }},
+    {"Photon Radius", 1, Keep::kMean, [](const PixelSample& s, float, float* o) { add_number(s.photon_radius, o); }},
+    {"Direct", 3, Keep::kLight, add_term<kDirectTerm>},
+    {"Specular", 3, Keep::kLight, add_term<kSpecularTerm>},
+    {"Caustic", 3, Keep::kLight, add_term<kCausticTerm>},
+    {"Global", 3, Keep::kLight, add_term<kGlobalTerm>},
     {"Emission", 3, Keep::kLight, [](const PixelSample& s, float exposure, float* o) { add_rgb(s.emission * exposure, o); }},
     {"Environment", 3, Keep::kLight, [](const PixelSample& s, float exposure, float* o) { add_rgb(s.environment * exposure, o); }},
 };
@@ -79,6 +92,8 @@ Film::Film(FilmSpec spec) : spec_(std::move(spec)), filter_(spec_.filter, spec_.
   }
   moments_.resize(pixels);
 }
+
+bool Film::wants(const std::string& pass) const { return std::find(spec_.passes.begin(), spec_.passes.end(), pass) != spec_.passes.end(); }
 
 bool Film::add_moments(Moments& m, const PixelSample& s) {
   ++m.count;

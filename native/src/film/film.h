@@ -26,11 +26,15 @@ struct FilmSpec {
   int region_height() const { return y1 - y0; }
 };
 
+// The terms that photon mapping's radiance is the sum of: straight from luminaires (or to the diffuse surface that is seen), by way of
+// mirrors and gloss that the eye sees, thrown by these onto the diffuse surface that is seen, and by way of other diffuse surfaces.
+enum LightTerm { kDirectTerm, kSpecularTerm, kCausticTerm, kGlobalTerm, kLightTerms };
+
 // What one sample says of its pixel. Positions and normals are of the first surface that is not see-through.
 struct PixelSample {
   Rgb radiance;
   float alpha = 1;
-  Rgb emission, environment, albedo;
+  Rgb emission, environment, albedo, terms[kLightTerms];
   bool has_surface = false;
   float depth = 1e10f;
   Vec3 position, normal;
@@ -38,6 +42,7 @@ struct PixelSample {
   bool has_uv = false;
   float object_index = 0, material_index = 0;
   float cache_record = 0;  // 1 where a record of an irradiance cache lies
+  float photons = 0, photon_density = 0, photon_radius = 0;  // in the pixel; per m²; m within which they are averaged
 };
 
 struct PassRule;  // what a pass holds and how it is averaged: film.cpp
@@ -55,6 +60,7 @@ class Film {
   const std::vector<Tile>& tiles() const { return tiles_; }
 
   static constexpr int kTileSize = 16;
+  bool wants(const std::string& pass) const;
   // Whether anything but light is asked for.
   bool has_data_passes() const { return has_data_passes_; }
   // Adds one sample to each pixel of a row of the tile; `y` within the region.

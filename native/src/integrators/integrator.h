@@ -50,6 +50,11 @@ struct KeptTable {
 };
 using Kept = std::map<std::string, KeptTable>;
 
+// CausticFlags of the scene's switches, which integrators that have them call so.
+inline uint8_t no_caustics(const Parameters& p) {
+  return uint8_t((p.on("caustics_reflective") ? 0 : kNoReflectiveCaustics) | (p.on("caustics_refractive") ? 0 : kNoRefractiveCaustics));
+}
+
 class Integrator {
  public:
   virtual ~Integrator() = default;

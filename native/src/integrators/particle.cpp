@@ -327,7 +327,7 @@ void ParticleIntegrator::look(const RenderContext& context, const Film& film, co
   end.direct_known = end.direct_gathered = direct_in_texels(context);
   trace_to_diffuse(
       context, film, end, camera, sampler, result, [](const ShadingPoint&, const Bsdf&) { return Rgb(); },
-      [&](const ShadingPoint& point, const Bsdf& bsdf, bool) { return read(point, bsdf); });
+      [&](const ShadingPoint& point, const Bsdf& bsdf, bool) { return KnownLight{Rgb(), read(point, bsdf)}; });
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ struct PathSettings {
   int min_bounces;
   BounceLimits limits;
   float clamp_direct, clamp_indirect;
-  bool reflective_caustics, refractive_caustics;
+  uint8_t without;  // CausticFlags: what diffuse surfaces do not see
   float filter_glossy;
 };
 
@@ -68,8 +68,7 @@ class PathIntegrator final : public Integrator {
             p.integer("transparent_bounces")},
            p.real("clamp_direct"),
            p.real("clamp_indirect"),
-           p.on("caustics_reflective"),
-           p.on("caustics_refractive"),
+           no_caustics(p),
            p.real("filter_glossy")} {}
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
@@ -149,7 +148,7 @@ class PathIntegrator final : public Integrator {
       const FilmSpec& spec = film.spec();
       const bool through_glass = spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness;
       if (!through_glass) path.seen_from_camera = false;
-      path.state.without = next->flags & kDiffuse ? no_caustics() : 0;
+      path.state.without = next->flags & kDiffuse ? s_.without : 0;
       const bool delta = next->flags & kSpecular;
       path.origin = {light_query(point, bsdf), delta ? kInf : next->pdf_dir};
       if (!delta) least_pdf = std::min(least_pdf, next->pdf_dir);
@@ -162,10 +161,6 @@ class PathIntegrator final : public Integrator {
         path.throughput *= 1.0f / alpha;
       }
     }
-  }
-
-  uint8_t no_caustics() const {
-    return uint8_t((s_.reflective_caustics ? 0 : kNoReflectiveCaustics) | (s_.refractive_caustics ? 0 : kNoRefractiveCaustics));
   }
 
   PathSettings s_;

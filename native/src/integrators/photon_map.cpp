@@ -77,21 +77,28 @@ class PhotonMapIntegrator final : public Integrator {
         radius_(p.real("radius")) {
     s_.limits = {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
                  p.integer("transparent_bounces")};
+    s_.without = no_caustics(p);
     s_.gathers = s_.direct_gathered = s_.caustics_known = p.on("gather");
   }
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     if (!built_) build(context, film);
     if (context.cancelled) return;
+    const bool shows_photons = film.wants("Photons") || film.wants("Photon Density") || film.wants("Photon Radius");
     for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) {
       trace_to_diffuse(
-          context, film, s_, camera, sampler, result, [&](const ShadingPoint& point, const Bsdf& bsdf) { return caustics(point, bsdf); },
+          context, film, s_, camera, sampler, result,
+          [&](const ShadingPoint& point, const Bsdf& bsdf) {
+            if (shows_photons && point.path.depth == 0) show_photons(point, result);
+            return caustics(point, bsdf);
+          },
           [&](const ShadingPoint& point, const Bsdf& bsdf, bool gathered) {
+            if (shows_photons && point.path.depth == 0) show_photons(point, result);
             const Rgb global = light_of(point, bsdf, [&](Vec3 normal) {
               return s_.gathers ? irradiance_.at(point.position, normal)
                                 : global_.irradiance(point.position, normal, reach_, global_count_);
             });
-            return gathered ? global : global + caustics(point, bsdf);
+            return KnownLight{gathered ? Rgb() : caustics(point, bsdf), global};
           });
     });
   }
@@ -101,7 +108,7 @@ class PhotonMapIntegrator final : public Integrator {
     const FilmSpec& spec = film.spec();
     const auto start = std::chrono::steady_clock::now();
     SubpathSettings light;
-    light.limits = s_.limits, light.footprint = {context.camera, spec.width, spec.height};
+    light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height};
     const uint8_t all = s_.gathers ? kDirectPhoton | kCausticPhoton | kGlobalPhoton : uint8_t(kGlobalPhoton);
     const EmissionGuide to_all = learn_emission(context, light, global_photons_, all, find_seen(context, film, s_.limits, s_.gathers));
     light.guide = &to_all;
@@ -122,6 +129,14 @@ class PhotonMapIntegrator final : public Integrator {
     context.log.set("photon bytes", double(global_.memory_bytes() + caustic_.memory_bytes()));
     context.log.say(std::to_string(global_.size()) + " global and " + std::to_string(caustic_.size()) + " caustic photons, " +
                     std::to_string((global_.memory_bytes() + caustic_.memory_bytes() + irradiance_.memory_bytes()) >> 20) + " MiB");
+  }
+
+  // Those that lie in the pixel, and what estimates near here come from.
+  void show_photons(const ShadingPoint& point, PixelSample& result) const {
+    result.photons =
+        float(global_.count(point.position, point.ng, point.footprint) + caustic_.count(point.position, point.ng, point.footprint));
+    result.photon_radius = global_.spread(point.position, global_count_);
+    result.photon_density = float(std::min(global_count_, global_.size())) / (kPi * sqr(result.photon_radius));
   }
 
   Rgb caustics(const ShadingPoint& point, const Bsdf& bsdf) const {
@@ -172,6 +187,8 @@ const Descriptor& photon_map_descriptor() {
           {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},
           {"transmission_bounces", "Transmission", Kind::kInt, 12, 0, 1024, "Refractions"},
           {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
+          {"caustics_reflective", "Reflective Caustics", Kind::kBool, 1, 0, 1, "Mirrors and glossy surfaces seen by diffuse ones"},
+          {"caustics_refractive", "Refractive Caustics", Kind::kBool, 1, 0, 1, "Glass seen by diffuse surfaces"},
       },
       [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<PhotonMapIntegrator>(p); }};
   return descriptor;

@@ -13,12 +13,13 @@ class SppmIntegrator final : public Integrator {
   explicit SppmIntegrator(const Parameters& p) : photons_(p.integer("photons")), radius_(p.real("radius")), alpha_(p.number("alpha")) {
     s_.limits = {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
                  p.integer("transparent_bounces")};
+    s_.without = no_caustics(p);
   }
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     const FilmSpec& spec = film.spec();
     SubpathSettings light;
-    light.limits = s_.limits, light.footprint = {context.camera, spec.width, spec.height};
+    light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height};
     if (guide_is_old_) {
       guide_ = learn_emission(context, light, photons_, kCausticPhoton | kGlobalPhoton, find_seen(context, film, s_.limits, false));
       guide_is_old_ = context.cancelled;
@@ -32,7 +33,9 @@ class SppmIntegrator final : public Integrator {
     for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) {
       trace_to_diffuse(
           context, film, s_, camera, sampler, result, [](const ShadingPoint&, const Bsdf&) { return Rgb(); },
-          [&](const ShadingPoint& point, const Bsdf& bsdf, bool) { return map.radiance(point, bsdf, scale * point.footprint); });
+          [&](const ShadingPoint& point, const Bsdf& bsdf, bool) {
+            return KnownLight{Rgb(), map.radiance(point, bsdf, scale * point.footprint)};
+          });
     });
   }
 
@@ -65,6 +68,8 @@ const Descriptor& sppm_descriptor() {
           {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},
           {"transmission_bounces", "Transmission", Kind::kInt, 12, 0, 1024, "Refractions"},
           {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
+          {"caustics_reflective", "Reflective Caustics", Kind::kBool, 1, 0, 1, "Mirrors and glossy surfaces seen by diffuse ones"},
+          {"caustics_refractive", "Refractive Caustics", Kind::kBool, 1, 0, 1, "Glass seen by diffuse surfaces"},
       },
       [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<SppmIntegrator>(p); }};
   return descriptor;

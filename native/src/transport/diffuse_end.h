@@ -5,6 +5,11 @@
 
 namespace gi {
 
+// The radiance of diffuse lobes, by how the light came there.
+struct KnownLight {
+  Rgb caustic, global;
+};
+
 struct DiffuseEndSettings {
   BounceLimits limits;
   uint8_t without = 0;          // CausticFlags: what a path does not see after a diffuse bounce
@@ -37,7 +42,8 @@ inline Rgb meet_light(const RenderContext& context, const BounceLimits& limits, 
   return found;
 }
 
-// Follows one path. `at_gather(point, bsdf)` and `at_end(point, bsdf, gathered)`: what is known of the radiance of the diffuse lobes there.
+// Follows one path. What is known of the radiance of the diffuse lobes: `at_gather(point, bsdf)` of caustics, `at_end(point, bsdf,
+// gathered)`.
 template <class AtGather, class AtEnd>
 void trace_to_diffuse(const RenderContext& context, const Film& film, const DiffuseEndSettings& s, const CameraRay& camera,
                       Sampler& sampler, PixelSample& result, const AtGather& at_gather, const AtEnd& at_end) {
@@ -49,8 +55,17 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
   bool may_scatter = true;
   bool gathered = false, known = false;  // `known`: what shines here has been counted where the path gathered
   const int first_depth = context.lightmap ? context.lightmap->first_depth() : 0;
-  const auto add = [&](Rgb radiance, int depth) {
-    if (depth >= first_depth) result.radiance += path.throughput * radiance;
+  LightTerm beyond = kDirectTerm;  // what comes from behind the first bounce belongs to
+  const auto add_to = [&](LightTerm term, Rgb radiance, int depth) {
+    if (depth < first_depth) return;
+    const Rgb light = path.throughput * radiance;
+    result.radiance += light, result.terms[term] += light;
+  };
+  const auto add = [&](Rgb radiance, int depth, LightTerm here) { add_to(path.state.depth == 0 ? here : beyond, radiance, depth); };
+  // Luminaires that the ray itself meets: of one that left diffuse lobes, the other half of what light sampling finds.
+  const auto add_met = [&](Rgb radiance) {
+    const int depth = path.state.depth;
+    add_to(depth == 0 || (depth == 1 && beyond == kGlobalTerm) ? kDirectTerm : beyond, radiance, depth);
   };
 
   for (uint32_t bounce = 0;; ++bounce) {
@@ -58,15 +73,15 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
     const uint32_t visibility = visibility_of(path.state.kind);
     const auto hit = context.scene.intersect(path.ray, visibility);
     const int depth = path.state.depth;
-    if (!known) add(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, kMode, visibility), depth);
+    if (!known) add_met(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, kMode, visibility));
     if (!hit) {
-      if (!known) add(path.leave(context, film, kMode, result), depth);
+      if (!known) add_met(path.leave(context, film, kMode, result));
       break;
     }
     const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
     const Rgb emitted = known ? Rgb() : surface_emission(context, point, bsdf.emission, path.origin, kMode);
     if (depth == 0) result.emission += path.throughput * emitted;
-    add(emitted, depth);
+    add_met(emitted);
 
     const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
     const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
@@ -79,33 +94,35 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
     const bool is_diffuse = bsdf.flags() & kDiffuse, gathers = s.gathers && !gathered && is_diffuse;
     if (gathers) {
       // From here either the diffuse lobes are followed, which then gather, or the others.
-      if (may_scatter) add(at_gather(point, bsdf), kIndirectDepth);
+      if (may_scatter) add(at_gather(point, bsdf), kIndirectDepth, kCausticTerm);
       const float diffuse = average(bsdf.albedo(point.wo, kDiffuse));
       const float others = average(bsdf.albedo(point.wo, kGlossy | kSpecular) + bsdf.transparency);
       const float p_diffuse = others > 0.0f ? std::clamp(diffuse / (diffuse + others), 0.1f, 0.9f) : 1.0f;
       if (p_diffuse == 1.0f) {
-        if (may_scatter) add(direct_light(), depth + 1);
+        if (may_scatter) add(direct_light(), depth + 1, kDirectTerm);
       } else {
         const bool follows_diffuse = sampler.next_1d() < p_diffuse;
         for (const bool last : {false, true}) {
           const bool is_for_diffuse = follows_diffuse == last;
           p_lobes = is_for_diffuse ? p_diffuse : 1.0f - p_diffuse;
           bsdf.choose(is_for_diffuse ? uint8_t(kDiffuse) : kOthers, point.wo);
-          if (may_scatter) add(direct_light(p_lobes), depth + 1);
+          if (may_scatter) add(direct_light(p_lobes), depth + 1, is_for_diffuse ? kDirectTerm : kSpecularTerm);
         }
       }
     } else if (may_scatter) {
       // The diffuse lobes end the path, the others go on.
       if (is_diffuse) {
-        add(at_end(point, bsdf, gathered), kIndirectDepth);
+        const KnownLight found = at_end(point, bsdf, gathered);
+        add(found.caustic, kIndirectDepth, kCausticTerm);
+        add(found.global, kIndirectDepth, kGlobalTerm);
         bsdf.choose(kDiffuse, point.wo);
         if (!(gathered ? s.direct_gathered : s.direct_known)) {
-          add(direct_light(), depth + 1);
-          add(meet_light(context, s.limits, point, bsdf, path.state, u, u_lobe), depth + 1);
+          add(direct_light(), depth + 1, kDirectTerm);
+          add(meet_light(context, s.limits, point, bsdf, path.state, u, u_lobe), depth + 1, kDirectTerm);
         }
         bsdf.choose(kOthers, point.wo);
       }
-      if (!(gathered && s.caustics_known)) add(direct_light(), depth + 1);
+      if (!(gathered && s.caustics_known)) add(direct_light(), depth + 1, kSpecularTerm);
     }
 
     const auto next = bsdf.sample(point.wo, u, u_lobe);
@@ -122,12 +139,14 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
       path.origin.query.path = path.state;
       continue;
     }
+    const bool gathers_next = gathers && (next->flags & kDiffuse);
+    if (depth == 0) beyond = gathers_next ? kGlobalTerm : kSpecularTerm;
     may_scatter = advance(path.state, next->flags, s.limits);
     const FilmSpec& spec = film.spec();
     if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
       path.seen_from_camera = false;
     known = gathered && s.caustics_known;
-    if (gathers && (next->flags & kDiffuse)) gathered = true;
+    if (gathers_next) gathered = true;
     path.state.without = next->flags & kDiffuse ? s.without : 0;
     path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : p_lobes * next->pdf_dir};
     path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};

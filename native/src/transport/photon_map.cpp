@@ -23,14 +23,14 @@ std::optional<Photon> within_limits(const LightVertex& v, const BounceLimits& li
   return photon;
 }
 
-// The part of a vertex's power that is of the wished classes.
-Rgb power_of(const LightVertex& v, uint8_t classes) {
+// The part of a vertex's power that is of the wished classes, and not thrown by lobes that diffuse surfaces are told not to see.
+Rgb power_of(const LightVertex& v, const SubpathSettings& settings, uint8_t classes) {
   if (!(v.bsdf.flags() & kDiffuse) || !(v.seen_by & kRayDiffuse)) return Rgb();
   if (v.is_first()) return classes & kDirectPhoton ? v.power : Rgb();
   Rgb share;
   if (classes & kCausticPhoton) share += v.by_mirrors;
   if (classes & kGlobalPhoton) share += Rgb(1.0f) - v.by_mirrors;
-  return v.power * share;
+  return v.power * share * (v.hides_mirrors(settings.without) ? Rgb(1.0f) - v.last_by_mirrors : Rgb(1.0f));
 }
 
 float cross2(Vec2 a, Vec2 b) { return a.x * b.y - a.y * b.x; }
@@ -84,7 +84,7 @@ std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSet
       trace_light_paths<std::vector<Photon>>(context, settings, pass, count, [&](const LightVertices& path, std::vector<Photon>& photons) {
         for (int i = 0; i < int(path.count()); ++i) {
           const LightVertex& v = path[size_t(i)];
-          const Rgb power = power_of(v, classes);
+          const Rgb power = power_of(v, settings, classes);
           if (is_black(power)) continue;
           auto photon = within_limits(v, settings.limits, v.max_bounces);
           if (!photon) continue;
@@ -116,7 +116,9 @@ SeenPoints find_seen(const RenderContext& context, const Film& film, const Bounc
                                  (float(spec.y0) + (float(y) + place.y) / kAcross * float(spec.region_height())) * pixel.y},
                                 pixel, lens);
       PixelSample nothing;
-      const auto note = [&](const ShadingPoint& point, const Bsdf&, bool) { return rows[size_t(y)].push_back(point.position), Rgb(); };
+      const auto note = [&](const ShadingPoint& point, const Bsdf&, bool) {
+        return rows[size_t(y)].push_back(point.position), KnownLight();
+      };
       trace_to_diffuse(context, film, end, ray, sampler, nothing, [](const ShadingPoint&, const Bsdf&) { return Rgb(); }, note);
     }
   });
@@ -139,7 +141,7 @@ EmissionGuide learn_emission(const RenderContext& context, SubpathSettings setti
           float worth = 0.0f;
           for (int i = 0; i < int(path.count()); ++i) {
             const LightVertex& v = path[size_t(i)];
-            const Rgb power = power_of(v, classes);
+            const Rgb power = power_of(v, settings, classes);
             if (!is_black(power) && seen.near(v.point.position)) worth += average(power);
           }
           if (worth > 0.0f) trials.push_back({path.start, worth});
@@ -179,6 +181,13 @@ Rgb PhotonMap::scattered(const ShadingPoint& point, const Bsdf& bsdf, const Phot
   const uint8_t side = dot(point.ng, wi) >= 0.0f ? kReflection : kTransmission;
   if (!(cosine > 1e-4f)) return Rgb();
   return Rgb(photon.power[0], photon.power[1], photon.power[2]) * bsdf.eval(point.wo, wi, side | kDiffuse).value / cosine;
+}
+
+size_t PhotonMap::count(Vec3 position, Vec3 normal, float radius) const {
+  size_t found = 0;
+  float radius_squared = sqr(radius);
+  tree_.within(position, radius_squared, [&](uint32_t k, float) { found += is_of(k, position, normal, radius); });
+  return found;
 }
 
 Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius) const {

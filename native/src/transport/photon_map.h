@@ -77,6 +77,8 @@ class PhotonMap {
   Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count) const;
   // Power per area on the side of `normal`, by the nearest `count` within `radius`; of those that reach an eye one diffuse bounce away.
   Rgb irradiance(Vec3 position, Vec3 normal, float radius, size_t count) const;
+  // How many lie within `radius`.
+  size_t count(Vec3 position, Vec3 normal, float radius) const;
   // The distance of the `count`-th photon.
   float spread(Vec3 position, size_t count) const;
 

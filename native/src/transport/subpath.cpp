@@ -109,6 +109,7 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     context.scene.shade(v.point, v.bsdf);
     const float cos_in = abs_dot(v.point.ng, v.point.wo);
     v.bounces = carried.bounces, v.seen_by = carried.seen_by, v.scattered = carried.scattered, v.by_mirrors = carried.by_mirrors;
+    v.last_by_mirrors = carried.last_by_mirrors, v.was_transmitted = carried.was_transmitted;
     v.max_bounces = carried.max_bounces;
     if (!(cos_in > 0.0f)) return;
     if (v.is_first()) {
@@ -164,7 +165,10 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     if (u_continue >= alpha) return;
     carried.power = v.power * factor / alpha;
     carried.weights = v.weights.scattered(h, is_delta, cos_out, next->pdf_dir, pdf_reverse, settings.merged(v.point.position));
-    carried.by_mirrors = is_delta ? v.by_mirrors : v.by_mirrors * (Rgb(1.0f) - diffuse_share(v, next->wi));
+    const Rgb diffuse = is_delta ? Rgb() : diffuse_share(v, next->wi);
+    if (v.hides_mirrors(settings.without)) carried.power *= Rgb(1.0f) - diffuse * v.last_by_mirrors;
+    carried.last_by_mirrors = Rgb(1.0f) - diffuse;
+    carried.by_mirrors = v.by_mirrors * carried.last_by_mirrors, carried.was_transmitted = next->flags & kTransmission;
     if (settings.only_by_mirrors && is_black(carried.by_mirrors)) return;
     carried.scattered = v.scattered + 1, carried.seen_by = visible;
     passed = Rgb(1.0f), travelled = 0;

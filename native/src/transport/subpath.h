@@ -58,9 +58,13 @@ struct LightVertex {
   BounceCount bounces;   // on the way here
   uint32_t seen_by = 0xffffffffu;  // RayKind bits: what of this surface sees where the light comes from
   Rgb by_mirrors{1.0f};            // the share of its power that no diffuse lobe scattered on the way
+  Rgb last_by_mirrors;             // that none scattered last
+  bool was_transmitted = false;    // last
   int scattered = 0;               // times on the way here, see-through surfaces left out; 0: lit by the luminaire itself
   int max_bounces = 1024;          // of the luminaire
   bool is_first() const { return scattered == 0; }
+  // Whether diffuse lobes here do not see what `last_by_mirrors` is the share of. `without`: CausticFlags.
+  bool hides_mirrors(uint8_t without) const { return without & (was_transmitted ? kNoRefractiveCaustics : kNoReflectiveCaustics); }
   int s() const { return scattered + 2; }  // vertices up to here, the one on the luminaire among them
 };
 
@@ -102,6 +106,7 @@ struct SubpathSettings {
   float joined = 1;  // light subpaths that each eye vertex is joined to, as the weights have it
   float merges = 0;  // η of merging [Georgiev 2012, eq. 20] where a pixel has radius 1: of photons over those joined; 0: nothing is merged
   const EmissionGuide* guide = nullptr;  // which strategies that weigh densities against others' know nothing of
+  uint8_t without = 0;  // CausticFlags: what diffuse surfaces do not see of others; whoever stores vertices has to ask too
   bool only_by_mirrors = false;  // ends at the first vertex all of whose light diffuse lobes scattered
 
   // The weight of merging at a vertex over that of joining it.
