@@ -13,7 +13,10 @@ import numpy as np
 from .nodes.program import op_table
 from .scene_data import Instance, Program, Scene, Settings
 
-IGNORED = {"clamp_direct", "min_spacing", "max_spacing", "min_length", "max_length"}  # settings that spoil nothing kept
+IGNORED = {  # settings that spoil nothing kept
+    *("clamp_direct", "min_spacing", "max_spacing", "min_length", "max_length"),
+    *("radius", "caustic_count", "global_count"),
+}
 NEAR = 0.02  # share of what a place sees that something may cover at most, to count as far from it
 MOST_BOXES = 512
 EMPTY = np.zeros((0, 6), np.float32)

@@ -183,6 +183,61 @@ def test_without_caustics_they_agree_with_path_tracing(way, name):
     assert (np.abs(blocks_of(scene, "path", 64).mean((0, 1)) - truth.mean((0, 1))) > 5 * whole).any()  # it matters
 
 
+def bulb_in_a_ball():
+    return scene_of((sphere(rings=32), surface(0.5)), lights=[lamp("POINT", (1.0,) * 3, matrix=matrix())])
+
+
+def wished(seed=1, **parameters):
+    """Irradiance read where the eye looks, the error it is said to have, and what is told."""
+    scene = bulb_in_a_ball()
+    scene.camera = sd.Camera("camera", "ORTHO", looking((0, 0, 0), (0.5, 0.3, 0.7)), (-0.4, 0.4, -0.4, 0.4), 0.0, 1e6)
+    scene.film = sd.Film(16, 16, filter="BOX", filter_width=1.0)
+    few = {"global_photons": 1000, "caustic_photons": 10, "gather": False}
+    settings = sd.Settings("photon_map", 1, seed=seed, threads=2, parameters={**BOUNCES, **few, **parameters})
+    with Session(scene, settings) as session:
+        while not session.wait():
+            pass
+        told = next(m for m in session.native.messages() if m.startswith("global photons: error"))
+        image = session.read("Combined")[..., 0].astype(np.float64)
+        return image, session.native.figures()["global photon error"], told
+
+
+def test_photons_are_sent_until_the_error_is_met():
+    runs = [wished(seed, photon_error=8) for seed in range(1, 9)]
+    assert all(error <= 0.08 and told.endswith("as wished") for _, error, told in runs)
+    images = np.array([image for image, _, _ in runs])
+    measured = math.sqrt((images.var(0, ddof=1) / images.mean(0) ** 2).mean())
+    assert 0.5 * np.mean([error for _, error, _ in runs]) < measured < 0.08
+
+
+def test_photons_end_with_the_memory():
+    _, error, told = wished(photon_error=0.5, photon_memory=1)
+    assert error > 0.005 and told.endswith("memory is used up")
+
+
+def test_kept_photons_make_the_same_picture():
+    scene = CAUSTICS["mirror and diffuse"]
+
+    def render(kept=None, **parameters):
+        built = scene()
+        built.camera, built.film = CAMERAS["perspective"](), sd.Film(16, 16)
+        settings = sd.Settings("photon_map", 2, threads=2, parameters={**LIMITS, **WAYS["gathered"][1], **parameters})
+        with Session(built, settings, kept=kept) as session:
+            while not session.wait():
+                pass
+            return session.read("Combined"), session.native.kept()
+
+    image, kept = render()
+    again, kept_again = render(kept, global_photons=1, caustic_photons=1)  # which would be dark
+    np.testing.assert_allclose(again, image, rtol=1e-3, atol=1e-5)
+    assert {name: table.shape for name, table in kept.items()} == {name: t.shape for name, t in kept_again.items()}
+    for spoil in (lambda t: t[1:].__setitem__((0, 3), np.nan), lambda t: t[1:].__setitem__((0, 10), 0.5)):
+        damaged = {name: np.array(table) for name, table in kept.items()}
+        spoil(damaged["caustic"])
+        with pytest.raises(Exception, match="'caustic', row 1: no photon"):
+            render(damaged)
+
+
 def terms(scene, position, direction, width=0.02, **options):
     """The picture and the terms that it is the sum of, first channels."""
     names = ["Combined", "Direct", "Specular", "Caustic", "Global"]

@@ -2,8 +2,10 @@
 // sampling, follow what is specular, read caustics from their own map at diffuse surfaces, and gather all other light from the surfaces
 // that they see there, where it is known from the photons.
 #include "transport/photon_map.h"
-#include <chrono>
 
+#include <bit>
+
+#include "core/check.h"
 #include "integrators/integrator.h"
 #include "transport/diffuse_end.h"
 
@@ -15,9 +17,9 @@ class IrradianceMap {
  public:
   IrradianceMap() = default;
   IrradianceMap(const PhotonMap& map, size_t count, float radius, const RenderContext& context) : radius_(radius) {
-    constexpr size_t kEvery = 4;
     std::vector<Vec3> positions;
-    for (size_t k = 0; k < map.size(); k += kEvery) {
+    for (size_t k = 0; k < map.size(); ++k) {
+      if (!is_chosen(map.position(k))) continue;
       records_.push_back({map.normal(k), Rgb()});
       positions.push_back(map.position(k));
     }
@@ -51,6 +53,12 @@ class IrradianceMap {
     Rgb irradiance;
   };
 
+  // One of four, whatever order they come in: kept photons are to show the same picture.
+  static bool is_chosen(Vec3 p) {
+    const uint32_t y = hash_combine(std::bit_cast<uint32_t>(p.y), std::bit_cast<uint32_t>(p.z));
+    return hash_combine(std::bit_cast<uint32_t>(p.x), y) % 4 == 0;
+  }
+
   std::vector<Record> records_;
   PointTree tree_;
   float radius_ = 0;
@@ -67,6 +75,23 @@ float typical_spread(const PhotonMap& map, size_t count) {
   return 2.0f * *most;
 }
 
+// A map, and how it came to be.
+struct Stock {
+  PhotonMap map;
+  double paths = 0;  // sent for it
+  size_t count = 0;  // neighbours
+  float reach = 0;  // farther away they are not looked for
+
+  KeptTable keep() const;
+};
+
+// Photons of an earlier render, and how many paths were sent for them.
+struct KeptPhotons {
+  std::vector<Photon> photons;
+  double paths = 0;  // 0: there was none
+};
+KeptPhotons photons_of(const Kept& kept, const std::string& name);
+
 class PhotonMapIntegrator final : public Integrator {
  public:
   explicit PhotonMapIntegrator(const Parameters& p)
@@ -74,7 +99,9 @@ class PhotonMapIntegrator final : public Integrator {
         caustic_photons_(p.integer("caustic_photons")),
         global_count_(size_t(p.integer("global_count"))),
         caustic_count_(size_t(p.integer("caustic_count"))),
-        radius_(p.real("radius")) {
+        radius_(p.real("radius")),
+        goal_(0.01 * p.number("photon_error")),
+        most_bytes_(size_t(p.integer("photon_memory")) << 20) {
     s_.limits = {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
                  p.integer("transparent_bounces")};
     s_.without = no_caustics(p);
@@ -96,51 +123,107 @@ class PhotonMapIntegrator final : public Integrator {
             if (shows_photons && point.path.depth == 0) show_photons(point, result);
             const Rgb global = light_of(point, bsdf, [&](Vec3 normal) {
               return s_.gathers ? irradiance_.at(point.position, normal)
-                                : global_.irradiance(point.position, normal, reach_, global_count_);
+                                : global_.map.irradiance(point.position, normal, global_.reach, global_.count);
             });
             return KnownLight{gathered ? Rgb() : caustics(point, bsdf), global};
           });
     });
   }
 
+  void take_over(const Kept& kept) override { kept_global_ = photons_of(kept, "global"), kept_caustic_ = photons_of(kept, "caustic"); }
+  Kept keep() const override { return built_ ? Kept{{"global", global_.keep()}, {"caustic", caustic_.keep()}} : Kept(); }
+
  private:
   void build(const RenderContext& context, const Film& film) {
-    const FilmSpec& spec = film.spec();
-    const auto start = std::chrono::steady_clock::now();
-    SubpathSettings light;
-    light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height};
-    const uint8_t all = s_.gathers ? kDirectPhoton | kCausticPhoton | kGlobalPhoton : uint8_t(kGlobalPhoton);
-    const EmissionGuide to_all = learn_emission(context, light, global_photons_, all, find_seen(context, film, s_.limits, s_.gathers));
-    light.guide = &to_all;
-    global_ = PhotonMap(trace_photons(context, light, 0, global_photons_, all), global_photons_, context.pool);
-    light.only_by_mirrors = true;
-    const EmissionGuide to_casters =
-        learn_emission(context, light, caustic_photons_, kCausticPhoton, find_seen(context, film, s_.limits, false));
-    light.guide = &to_casters;
-    caustic_ = PhotonMap(trace_photons(context, light, 0, caustic_photons_, kCausticPhoton), caustic_photons_, context.pool);
+    const double start = context.seconds();
+    if (kept_global_.paths == 0.0) {
+      const FilmSpec& spec = film.spec();
+      SubpathSettings light;
+      light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height};
+      const uint8_t all = s_.gathers ? kDirectPhoton | kCausticPhoton | kGlobalPhoton : uint8_t(kGlobalPhoton);
+      global_ = send(context, light, "global", global_photons_, global_count_, all, find_seen(context, film, s_.limits, s_.gathers));
+      light.only_by_mirrors = true;
+      caustic_ =
+          send(context, light, "caustic", caustic_photons_, caustic_count_, kCausticPhoton, find_seen(context, film, s_.limits, false));
+    } else {
+      global_ = {PhotonMap(std::move(kept_global_.photons), kept_global_.paths, context.pool), kept_global_.paths};
+      caustic_ = {PhotonMap(std::move(kept_caustic_.photons), kept_caustic_.paths, context.pool), kept_caustic_.paths};
+      come_to_neighbours(global_, global_count_), come_to_neighbours(caustic_, caustic_count_);
+    }
     if (context.cancelled) return;
-    reach_ = typical_spread(global_, global_count_);
-    if (s_.gathers) irradiance_ = IrradianceMap(global_, global_count_, reach_, context);
+    const double traced = context.seconds();
+    context.log.stage("irradiance at photons");
+    if (s_.gathers) irradiance_ = IrradianceMap(global_.map, global_.count, global_.reach, context);
+    context.log.stage("");
     built_ = !context.cancelled;
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    context.log.set("global photons", double(global_.size()));
-    context.log.set("caustic photons", double(caustic_.size()));
-    context.log.set("photon seconds", took.count());
-    context.log.set("photon bytes", double(global_.memory_bytes() + caustic_.memory_bytes()));
-    context.log.say(std::to_string(global_.size()) + " global and " + std::to_string(caustic_.size()) + " caustic photons, " +
-                    std::to_string((global_.memory_bytes() + caustic_.memory_bytes() + irradiance_.memory_bytes()) >> 20) + " MiB");
+    const size_t bytes = global_.map.memory_bytes() + caustic_.map.memory_bytes();
+    context.log.set("global photons", double(global_.map.size()));
+    context.log.set("caustic photons", double(caustic_.map.size()));
+    context.log.set("photon seconds", traced - start);
+    context.log.set("photon bytes", double(bytes));
+    context.log.say(std::to_string(global_.map.size()) + " global and " + std::to_string(caustic_.map.size()) + " caustic photons, " +
+                    std::to_string((bytes + irradiance_.memory_bytes()) >> 20) + " MiB");
+  }
+
+  // Sends light paths that aim at what is seen: `paths` of them, and as many again until the error is as wished.
+  Stock send(const RenderContext& context, SubpathSettings light, const std::string& name, int paths, size_t count, uint8_t classes,
+             const SeenPoints& seen) const {
+    context.log.stage(name + " photons");
+    const EmissionGuide guide = learn_emission(context, light, paths, classes, seen);
+    light.guide = &guide;
+    std::vector<Photon> photons = trace_photons(context, light, 0, paths, classes);
+    const double began = context.seconds();
+    for (double sent = paths; !context.cancelled; sent *= 2.0) {
+      Stock stock{PhotonMap(photons, sent, context.pool), sent};
+      const PhotonError error = come_to_neighbours(stock, count);
+      if (goal_ <= 0.0) return stock;
+      const char* reason = photons.empty()                                                                             ? "there are none"
+                           : error.total() <= goal_                                                                    ? "as wished"
+                           : 2 * stock.map.memory_bytes() > most_bytes_                                                ? "memory is used up"
+                           : context.time_limit > 0.0 && 3.0 * (context.seconds() - began) > 0.25 * context.time_limit ? "time is used up"
+                           : sent > 5e8 ? "there are too many"
+                                        : nullptr;
+      const std::string state = name + " photons: error " + percent(error.total()) + " (noise " + percent(error.noise) + ", blur " +
+                                percent(error.blur) + ") after " + std::to_string(int64_t(sent)) + " light paths";
+      context.log.stage(state);
+      if (reason) {
+        context.log.say(state + ", " + std::to_string(stock.count) + " neighbours: " + reason);
+        context.log.set(name + " photon error", error.total());
+        return stock;
+      }
+      const auto more = trace_photons(context, light, 1, int(sent), classes);
+      photons.insert(photons.end(), more.begin(), more.end());
+    }
+    return {};
+  }
+
+  // Sets how many neighbours are looked for, and how far away: `count`, or as many as the noise that is wished asks for.
+  PhotonError come_to_neighbours(Stock& stock, size_t count) const {
+    constexpr size_t kFewest = 10, kMost = 5000;
+    stock.count = count, stock.reach = typical_spread(stock.map, count);
+    if (goal_ <= 0.0) return {};
+    const double noise = stock.map.error(stock.reach, count).noise, wished = goal_ * std::sqrt(0.5);
+    stock.count = std::clamp(size_t(double(count) * sqr(noise / wished)), kFewest, kMost);
+    stock.reach = typical_spread(stock.map, stock.count);
+    return stock.map.error(stock.reach, stock.count);
+  }
+
+  static std::string percent(double x) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.1f %%", 100.0 * x);
+    return text;
   }
 
   // Those that lie in the pixel, and what estimates near here come from.
   void show_photons(const ShadingPoint& point, PixelSample& result) const {
     result.photons =
-        float(global_.count(point.position, point.ng, point.footprint) + caustic_.count(point.position, point.ng, point.footprint));
-    result.photon_radius = global_.spread(point.position, global_count_);
-    result.photon_density = float(std::min(global_count_, global_.size())) / (kPi * sqr(result.photon_radius));
+        float(global_.map.count(point.position, point.ng, point.footprint) + caustic_.map.count(point.position, point.ng, point.footprint));
+    result.photon_radius = global_.map.spread(point.position, global_.count);
+    result.photon_density = float(std::min(global_.count, global_.map.size())) / (kPi * sqr(result.photon_radius));
   }
 
   Rgb caustics(const ShadingPoint& point, const Bsdf& bsdf) const {
-    return caustic_.radiance(point, bsdf, radius_ * point.footprint, caustic_count_);
+    return caustic_.map.radiance(point, bsdf, radius_ * point.footprint, caustic_.count);
   }
 
   // What the diffuse lobes make of irradiance(normal of the side), as if it came from everywhere alike.
@@ -157,12 +240,39 @@ class PhotonMapIntegrator final : public Integrator {
   int global_photons_, caustic_photons_;
   size_t global_count_, caustic_count_;
   float radius_;
+  double goal_;  // relative error; 0: none
+  size_t most_bytes_;
   DiffuseEndSettings s_;
-  PhotonMap global_, caustic_;
+  Stock global_, caustic_;
   IrradianceMap irradiance_;
-  float reach_ = 0;
+  KeptPhotons kept_global_, kept_caustic_;
   bool built_ = false;
 };
+
+// A row for each photon; the first row says how many paths were sent for them.
+KeptTable Stock::keep() const {
+  const std::vector<Photon> all = map.photons();
+  KeptTable table{Photon::kNumbers, std::vector<float>((all.size() + 1) * Photon::kNumbers)};
+  table.numbers[0] = float(paths);
+  for (size_t i = 0; i < all.size(); ++i) all[i].write(&table.numbers[(i + 1) * Photon::kNumbers]);
+  return table;
+}
+
+KeptPhotons photons_of(const Kept& kept, const std::string& name) {
+  const auto found = kept.find(name);
+  require(found != kept.end() && found->second.columns == Photon::kNumbers && found->second.rows() > 0,
+          "there is no table '" + name + "' of photons");
+  const KeptTable& table = found->second;
+  KeptPhotons all;
+  all.paths = table.numbers[0];
+  require(all.paths >= 1.0 && std::isfinite(all.paths), "'" + name + "' does not say how many light paths were sent");
+  for (size_t i = 1; i < table.rows(); ++i) {
+    const auto photon = Photon::read(&table.numbers[i * table.columns]);
+    require(photon.has_value(), "'" + name + "', row " + std::to_string(i) + ": no photon");
+    all.photons.push_back(*photon);
+  }
+  return all;
+}
 
 }  // namespace
 
@@ -180,6 +290,10 @@ const Descriptor& photon_map_descriptor() {
           {"global_count", "Global Neighbours", Kind::kInt, 100, 2, 10000, "Photons by which the light of a place is estimated"},
           {"caustic_count", "Caustic Neighbours", Kind::kInt, 60, 2, 10000, "Photons by which a caustic is estimated"},
           {"radius", "Caustic Radius", Kind::kFloat, 12, 0.1, 1000, "Farther away photons are not looked for, in pixels"},
+          {"photon_error", "Photon Error", Kind::kFloat, 0, 0, 100,
+           "Photons are sent and neighbours chosen until the estimated error is below; 0: the numbers above", "%"},
+          {"photon_memory", "Photon Memory", Kind::kInt, 512, 1, 1 << 20,
+           "Of each map, at most, where photons are sent until the error is met", "MiB"},
           {"gather", "Final Gather", Kind::kBool, 1, 0, 1,
            "Looks for indirect light in all directions, and reads photons where it comes from; off: reads them where the eye looks"},
           {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
@@ -190,7 +304,9 @@ const Descriptor& photon_map_descriptor() {
           {"caustics_reflective", "Reflective Caustics", Kind::kBool, 1, 0, 1, "Mirrors and glossy surfaces seen by diffuse ones"},
           {"caustics_refractive", "Refractive Caustics", Kind::kBool, 1, 0, 1, "Glass seen by diffuse surfaces"},
       },
-      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<PhotonMapIntegrator>(p); }};
+      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<PhotonMapIntegrator>(p); },
+      false,
+      1};
   return descriptor;
 }
 

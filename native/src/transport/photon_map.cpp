@@ -106,15 +106,17 @@ SeenPoints find_seen(const RenderContext& context, const Film& film, const Bounc
   end.limits = limits, end.gathers = gathers, end.direct_known = end.direct_gathered = end.caustics_known = true;
   const FilmSpec& spec = film.spec();
   const Vec2 pixel{1.0f / float(spec.width), 1.0f / float(spec.height)};
+  const size_t eyes = 1 + context.path.size();
   std::vector<std::vector<Vec3>> rows(kAcross);
   context.pool.for_each(kAcross, context.cancelled, [&](int y) {
     for (int x = 0; x < kAcross; ++x) {
       Sampler sampler(hash_combine(context.seed, kStream), uint32_t(y), uint32_t(x));
       const Vec2 place = sampler.next_2d(), lens = sampler.next_2d();
-      const CameraRay ray =
-          context.camera.sample({(float(spec.x0) + (float(x) + place.x) / kAcross * float(spec.region_width())) * pixel.x,
-                                 (float(spec.y0) + (float(y) + place.y) / kAcross * float(spec.region_height())) * pixel.y},
-                                pixel, lens);
+      const size_t eye = size_t(y * kAcross + x) % eyes;
+      const Camera& camera = eye == 0 ? context.camera : context.path[eye - 1];
+      const CameraRay ray = camera.sample({(float(spec.x0) + (float(x) + place.x) / kAcross * float(spec.region_width())) * pixel.x,
+                                           (float(spec.y0) + (float(y) + place.y) / kAcross * float(spec.region_height())) * pixel.y},
+                                          pixel, lens);
       PixelSample nothing;
       const auto note = [&](const ShadingPoint& point, const Bsdf&, bool) {
         return rows[size_t(y)].push_back(point.position), KnownLight();
@@ -159,6 +161,56 @@ PhotonMap::PhotonMap(std::vector<Photon> photons, double paths, ThreadPool& pool
   tree_ = PointTree(positions, pool);
   lights_.reserve(photons.size());
   for (const uint32_t i : tree_.order()) lights_.push_back(photons[i]);
+}
+
+void Photon::write(float* row) const {
+  const float numbers[kNumbers] = {position.x, position.y, position.z, float(wi.u),  float(wi.v),    float(normal.u), float(normal.v),
+                                   power[0],   power[1],   power[2],   float(total), float(diffuse), float(glossy),   float(transmission)};
+  std::copy_n(numbers, kNumbers, row);
+}
+
+std::optional<Photon> Photon::read(const float* row) {
+  for (size_t i = 0; i < kNumbers; ++i) {
+    const bool is_direction = i >= 3 && i < 7, is_count = i >= 10;
+    if (!std::isfinite(row[i])) return {};
+    if ((is_direction || is_count) && row[i] != std::floor(row[i])) return {};
+    if ((is_direction && std::abs(row[i]) > 32767.0f) || (is_count && !(row[i] >= 0.0f && row[i] < 256.0f))) return {};
+  }
+  Photon p;
+  p.position = {row[0], row[1], row[2]};
+  p.wi.u = int16_t(row[3]), p.wi.v = int16_t(row[4]), p.normal.u = int16_t(row[5]), p.normal.v = int16_t(row[6]);
+  std::copy_n(row + 7, 3, p.power);
+  p.total = uint8_t(row[10]), p.diffuse = uint8_t(row[11]), p.glossy = uint8_t(row[12]), p.transmission = uint8_t(row[13]);
+  return p;
+}
+
+std::vector<Photon> PhotonMap::photons() const {
+  std::vector<Photon> all(size());
+  for (size_t k = 0; k < size(); ++k) static_cast<PhotonLight&>(all[k]) = lights_[k], all[k].position = position(k);
+  return all;
+}
+
+PhotonError PhotonMap::error(float radius, size_t count) const {
+  const size_t probes = std::min<size_t>(512, size());
+  double noise = 0, difference = 0;
+  size_t lit = 0;
+  for (size_t i = 0; i < probes; ++i) {
+    const size_t k = i * size() / probes;
+    const Rgb all = irradiance(position(k), normal(k), radius, count), half = irradiance(position(k), normal(k), radius, count / 2);
+    if (is_black(all)) continue;
+    double sum = 0, squares = 0;
+    for (const auto& f : around(position(k), normal(k), radius, count)) {
+      const float* power = lights_[f.point].power;
+      const double mean = power[0] + power[1] + power[2];
+      sum += mean, squares += mean * mean;
+    }
+    noise += squares / (sum * sum), difference += sqr(double(average(half)) / double(average(all)) - 1.0);
+    ++lit;
+  }
+  if (lit == 0) return {};
+  noise /= double(lit), difference /= double(lit);
+  // What half the photons leave out is as noisy as all together. Blur grows with the area.
+  return {std::sqrt(noise), 2.0 * std::sqrt(std::max(difference - noise, 0.0))};
 }
 
 float PhotonMap::spread(Vec3 position, size_t count) const {
@@ -215,7 +267,7 @@ Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radiu
   return sum * (3.0f * scale_ / (kPi * sqr(end)));
 }
 
-Rgb PhotonMap::irradiance(Vec3 position, Vec3 normal, float radius, size_t count) const {
+const std::vector<PointTree::Found>& PhotonMap::around(Vec3 position, Vec3 normal, float radius, size_t count) const {
   static thread_local std::vector<PointTree::Found> found;
   PathState eye;
   eye.depth = eye.diffuse_depth = 1;
@@ -223,6 +275,11 @@ Rgb PhotonMap::irradiance(Vec3 position, Vec3 normal, float radius, size_t count
     const PhotonLight& photon = lights_[k];
     return photon.reaches(eye) && dot(photon.normal.unpack(), normal) > 0.0f && is_of(k, position, normal, radius);
   });
+  return found;
+}
+
+Rgb PhotonMap::irradiance(Vec3 position, Vec3 normal, float radius, size_t count) const {
+  const std::vector<PointTree::Found>& found = around(position, normal, radius, count);
   if (found.empty()) return Rgb();
   float end = 0.0f;
   for (const auto& f : found) end = std::max(end, f.distance_squared);

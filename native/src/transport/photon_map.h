@@ -31,6 +31,11 @@ struct PhotonLight {
 };
 struct Photon : PhotonLight {
   Vec3 position;
+
+  // As a row of a table.
+  static constexpr size_t kNumbers = 14;
+  void write(float* row) const;
+  static std::optional<Photon> read(const float* row);  // nothing if it is none
 };
 
 enum PhotonClass : uint8_t {
@@ -60,6 +65,13 @@ inline bool of_one_surface(Vec3 away, Vec3 its_normal, Vec3 normal, float radius
   return abs_dot(away, normal) < kThickness * radius && abs_dot(its_normal, normal) > kSlope;
 }
 
+// How far estimates by the nearest photons are off on average, relative, where photons lie.
+struct PhotonError {
+  double noise = 0;  // by chance: falls as more neighbours are averaged
+  double blur = 0;   // by the distance of these: falls as there are more photons
+  double total() const { return std::hypot(noise, blur); }
+};
+
 // Photons that can be looked up. Those of other surfaces are refused: of another slope, or off the plane of the point.
 class PhotonMap {
  public:
@@ -67,6 +79,7 @@ class PhotonMap {
   PhotonMap(std::vector<Photon> photons, double paths, ThreadPool& pool);
 
   size_t size() const { return lights_.size(); }
+  std::vector<Photon> photons() const;
   Vec3 position(size_t k) const { return tree_.point(uint32_t(k)); }
   Vec3 normal(size_t k) const { return lights_[k].normal.unpack(); }
   size_t memory_bytes() const { return lights_.capacity() * sizeof(PhotonLight) + tree_.memory_bytes(); }
@@ -79,12 +92,16 @@ class PhotonMap {
   Rgb irradiance(Vec3 position, Vec3 normal, float radius, size_t count) const;
   // How many lie within `radius`.
   size_t count(Vec3 position, Vec3 normal, float radius) const;
+  // Of irradiance by `count` within `radius`: noise by the photons' powers, blur by the difference that half of them make.
+  PhotonError error(float radius, size_t count) const;
   // The distance of the `count`-th photon.
   float spread(Vec3 position, size_t count) const;
 
  private:
   bool is_of(uint32_t k, Vec3 position, Vec3 normal, float radius) const;
   Rgb scattered(const ShadingPoint& point, const Bsdf& bsdf, const PhotonLight& photon) const;
+  // Those that irradiance is estimated by.
+  const std::vector<PointTree::Found>& around(Vec3 position, Vec3 normal, float radius, size_t count) const;
 
   std::vector<PhotonLight> lights_;  // in the order of the tree
   PointTree tree_;
