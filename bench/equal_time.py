@@ -5,8 +5,9 @@
 Each way renders each scene (files, or words in names of the shared scenes) for about S seconds of sampling, once per seed, in a process of
 its own. The error is the relative mean squared one, (x − r)² / (r² + (mean r / 10)²), of the worst pixels without a thousandth; `spread` is
 the same between seeds, which no difference between the engines can touch, nor what a biased way is off. The reference is a long render by
-another seed and the unbiased way that is least noisy per second. Denoising, adaptive sampling, clamping and Filter Glossy are off, caustics are on, bounces are the scene's own.
-Writes bench/results/equal_time.json, .md, and pictures side by side."""
+another seed and the unbiased way that is least noisy per second, or the way --by. Denoising, adaptive sampling, clamping and Filter
+Glossy are off, caustics are on, bounces are the scene's own. Replaces the scenes' rows in bench/results/equal_time.json and .md, and
+their pictures side by side."""
 
 from __future__ import annotations
 
@@ -35,6 +36,7 @@ WAYS = {
     "cycles": ("CYCLES", ""),
 }
 UNBIASED = ("bdpt", "path")  # of which one makes the reference
+HOW = ("threads", "pixels", "seeds")  # that the figures of a scene depend on
 RESULTS = ROOT / "bench" / "results"
 LIMIT = 1800  # seconds
 
@@ -139,9 +141,11 @@ def measure_scene(file: Path, options) -> dict:
     found = {way: run_child(file, way, options, options.seconds, options.seeds, 1) for way in options.ways}
     last = {way: [o["image"] for o in found[way] if o["wanted"] == options.seconds[-1]] for way in options.ways}
     rough = np.mean([image for images in last.values() for image in images], 0)
-    calmest = min((w for w in UNBIASED if w in options.ways), key=lambda w: spread(last[w], rough), default=UNBIASED[0])
+    calmest = options.by or min(
+        (w for w in UNBIASED if w in options.ways), key=lambda w: spread(last[w], rough), default=UNBIASED[0]
+    )
     reference = run_child(file, calmest, options, [options.reference], 1, 7)[0]["image"]
-    row = {"scene": file.stem, "reference": calmest, "ways": {}}
+    row = {"scene": file.stem, "reference": calmest, **{name: getattr(options, name) for name in HOW}, "ways": {}}
     for way in options.ways:
         row["ways"][way] = []
         for wanted in options.seconds:
@@ -172,24 +176,25 @@ def save_pictures(stem: str, reference: np.ndarray, images: dict) -> None:
     image.save()
 
 
-def table(rows: list[dict], options) -> str:
-    lines = [
-        f"# Error at equal time\n\n{options.threads} threads, {options.pixels} pixels, means of {options.seeds} seeds.\n",
-        "| scene | way | seconds | samples | relative MSE | between seeds | times Cycles' |",
-        "|---|---|---|---|---|---|---|",
-    ]
+def ratio(step: dict, theirs: list[dict], name: str) -> str:
+    return f"{step[name] * step['seconds'] / (theirs[0][name] * theirs[0]['seconds']):.3f}" if theirs else "–"
+
+
+def table(rows: list[dict]) -> str:
+    lines = ["# Error at equal time\n", "`python bench/equal_time.py`\n"]
     for row in rows:
+        how = ", ".join(f"{row[name]} {name}" for name in HOW if name in row)
+        lines += [
+            f"## {row['scene']}\n\n{how}; reference by {row['reference']}\n",
+            "| way | seconds | samples | relative MSE | between seeds | MSE × time, of Cycles' | between seeds × time, of Cycles' |",
+            "|---|---|---|---|---|---|---|",
+        ]
         for way, steps in row["ways"].items():
             for k, step in enumerate(steps):
-                theirs = row["ways"].get("cycles")
-                ratio = (
-                    f"{step['spread'] * step['seconds'] / (theirs[k]['spread'] * theirs[k]['seconds']):.2f}"
-                    if theirs
-                    else "–"
-                )
-                lines.append(
-                    f"| {row['scene']} | {way} | {step['seconds']:.1f} | {step['samples']} | {step['error']:.4f} | {step['spread']:.4f} | {ratio} |"
-                )
+                ratios = [ratio(step, row["ways"].get("cycles", [])[k : k + 1], name) for name in ("error", "spread")]
+                figures = f"{step['seconds']:.1f} | {step['samples']} | {step['error']:.4f} | {step['spread']:.4f}"
+                lines.append(f"| {way} | {figures} | {' | '.join(ratios)} |")
+        lines.append("")
     return "\n".join(lines) + "\n"
 
 
@@ -199,6 +204,7 @@ def main() -> None:
     parser.add_argument("--ways", nargs="+", choices=WAYS, default=["path", "bdpt", "cycles"])
     parser.add_argument("--seconds", nargs="+", type=float, default=[4.0, 16.0])
     parser.add_argument("--reference", type=float, default=120.0)
+    parser.add_argument("--by", choices=WAYS, help="the way that makes the reference")
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--pixels", type=int, default=20_000)
     parser.add_argument("--threads", type=int, default=2)
@@ -212,13 +218,14 @@ def main() -> None:
         os._exit(0)  # Blender's module can hang at exit
     files = [Path(w) for w in options.words if w.endswith(".blend")] or scenes(options.words)
     RESULTS.mkdir(exist_ok=True)
-    rows = []
+    record = RESULTS / "equal_time.json"
     for file in files:
-        rows.append(measure_scene(file, options))
-        text = table(rows, options)
-        (RESULTS / "equal_time.json").write_text(json.dumps(rows, indent=1) + "\n")
-        (RESULTS / "equal_time.md").write_text(text)
-        print(text, flush=True)
+        row = measure_scene(file, options)
+        rows = json.loads(record.read_text()) if record.exists() else []
+        rows = sorted([r for r in rows if r["scene"] != row["scene"]] + [row], key=lambda r: r["scene"])
+        record.write_text(json.dumps(rows, indent=1) + "\n")
+        (RESULTS / "equal_time.md").write_text(table(rows))
+        print(table([row]), flush=True)
     os._exit(0)
 
 
