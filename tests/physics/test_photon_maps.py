@@ -1,0 +1,117 @@
+"""What photon maps hold, and what they say at borders and under a lens: balances of energy, closed forms, light tracing."""
+
+import math
+
+import numpy as np
+import pytest
+from light_scenes import lamp, matrix
+from test_closed_forms import BOUNCES, cube, glass, looking, quad, scene_of, sphere, surface
+
+from gi_engine import scene_data as sd
+from gi_engine.session import Session
+
+POWERS = slice(7, 10)  # columns of a table of photons
+
+
+def render(integrator, scene, position, direction, width, samples=4, pixels=16, seed=1, **parameters):
+    """First channel, and the tables that are kept."""
+    half = width / 2
+    scene.camera = sd.Camera("camera", "ORTHO", looking(position, direction), (-half, half, -half, half), 0.0, 1e6)
+    scene.film = sd.Film(pixels, pixels, filter="BOX", filter_width=1.0)
+    settings = sd.Settings(integrator, samples, seed=seed, threads=2, parameters={**BOUNCES, **parameters})
+    with Session(scene, settings) as session:
+        while not session.wait():
+            pass
+        return session.read("Combined")[..., 0].astype(np.float64), session.native.kept()
+
+
+def power_of(table):
+    """Of all photons together, watts in one channel; the first row says how many paths were sent."""
+    return table[1:, POWERS].sum(0, dtype=np.float64)[0] / table[0, 0]
+
+
+@pytest.mark.parametrize("albedo", [0.3, 0.7])
+def test_a_closed_box_holds_all_power(albedo):
+    """Each bounce leaves what came, and sends on its share: P Σ ρⁱ. Of those, what has met no surface yet is direct."""
+    scene = scene_of((cube(), surface(albedo)), lights=[lamp("POINT", (12.0,) * 3, matrix=matrix((0.2, 0.1, -0.3)))])
+    bounces = {"max_bounces": 4, "diffuse_bounces": 4, "caustic_photons": 100}
+    for gather, first in ((True, 0), (False, 1)):
+        photons = {"global_photons": 100_000, "gather": gather}
+        _, kept = render("photon_map", scene, (0, 0, 0), (0, 0, -1), 0.1, **photons, **bounces)
+        truth = 12 * sum(albedo**i for i in range(first, 5))
+        assert power_of(kept["global"]) == pytest.approx(truth, rel=0.01, abs=1e-9)
+        assert len(kept["caustic"]) == 1
+
+
+def test_an_open_scene_holds_what_does_not_escape():
+    """A square seen from the middle of a cube that it would be a face of: a sixth of the power."""
+    square = quad((-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1))
+    scene = scene_of((square, surface(0.5)), lights=[lamp("POINT", (6.0,) * 3, matrix=matrix())])
+    _, kept = render("photon_map", scene, (0, 0, 0), (0, 0, -1), 1.9, global_photons=100_000, caustic_photons=100)
+    assert power_of(kept["global"]) == pytest.approx(1.0, rel=0.02)
+
+
+def test_glass_takes_nothing_and_holds_no_photons():
+    """What falls on a clear ball of which the lamp sees the cone of sine 1/2 comes to the box around it, as caustics."""
+    light = lamp("POINT", (1.0,) * 3, matrix=matrix((0.6, 0, 0)))
+    scene = scene_of((cube(), surface(0.001)), (sphere(0.3), glass(1.5)), lights=[light])
+    sent = {"global_photons": 100_000, "caustic_photons": 200_000}
+    _, kept = render("photon_map", scene, (0, 0, -0.5), (0, 0, -1), 0.1, **sent)
+    assert power_of(kept["global"]) == pytest.approx(1.001, rel=0.005)
+    assert power_of(kept["caustic"]) == pytest.approx((1 - math.sqrt(3) / 2) / 2, rel=0.02)
+    assert (np.abs(kept["caustic"][1:, :3]).max(1) > 0.99).all()
+
+
+def bowl(top):
+    return scene_of(
+        (sphere(1.0, 48, top), surface(0.5)), lights=[lamp("POINT", (4 * math.pi**2,) * 3, matrix=matrix())]
+    )
+
+
+@pytest.mark.parametrize("gather", [True, False])
+@pytest.mark.parametrize("away", [0.5, 0.02])
+def test_borders_are_as_bright_as_the_middle(away, gather):
+    """A bowl cut from a sphere with a lamp in its middle is lit evenly up to its rim: each of its points sees all others alike."""
+    top = 0.75 * math.pi
+    truth = 0.5 / (1 - 0.5 * (1 - math.cos(top)) / 2)
+    angle = top - away
+    place = np.array([math.sin(angle), 0, -math.cos(angle)])
+    found = [
+        render(
+            "photon_map",
+            bowl(top),
+            0.5 * place,
+            place,
+            0.02,
+            seed=seed,
+            samples=8,
+            global_photons=50_000,
+            gather=gather,
+        )[0].mean()
+        for seed in range(1, 9)
+    ]
+    error = np.std(found, ddof=1) / math.sqrt(len(found))
+    assert error < 0.02 * truth
+    assert abs(np.mean(found) - truth) < 4 * error + 0.03 * truth
+
+
+def test_the_caustic_of_a_lens_is_that_of_light_tracing():
+    """Under a glass ball, in rings about the focus: light tracing needs no density estimate."""
+    floor = quad((-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1))
+    light = lamp("SPOT", (30.0,) * 3, matrix=matrix((0, 0, 3)), radius=0.1, spot_size=0.35, spot_blend=0.1)
+    scene = scene_of((floor, surface(0.8)), (sphere(0.4, 64), glass(1.5)), lights=[light])
+    view = ((0, 0, -0.7), (0, 0, -1), 1.2)  # from below the ball
+    pixels = 48
+    at = (np.arange(pixels) + 0.5) / pixels - 0.5
+    ring = (np.hypot(*np.meshgrid(at, at)) * 20).astype(int)
+
+    def rings(integrator, samples, **parameters):
+        seeds = [render(integrator, scene, *view, samples, pixels, s, **parameters)[0] for s in range(1, 5)]
+        found = np.array([[image[ring == r].mean() for r in range(10)] for image in seeds])
+        return found.mean(0), found.std(0, ddof=1) / 2
+
+    truth, error = rings("light", 64)
+    for way, parameters in (("photon_map", {"caustic_photons": 200_000}), ("sppm", {"photons": 100_000, "radius": 2})):
+        found, own = rings(way, 8, **parameters)
+        assert truth.max() > 5 * np.median(truth)
+        np.testing.assert_array_less(np.abs(found - truth), 5 * np.hypot(error, own) + 0.03 * truth)
