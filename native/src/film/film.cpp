@@ -131,7 +131,7 @@ void Film::start_splats(double unit) {
 
 void Film::end_splats(bool finished) { finished ? splats_->fold() : splats_->drop(); }
 
-void Film::splat(Vec2 at, bool wraps, Rgb value, Vec2 u) {
+bool Film::splat(Vec2 at, bool wraps, Rgb value, Vec2 u) {
   const PixelFilter::Share x = filter_.choose(at.x * float(spec_.width), u.x), y = filter_.choose(at.y * float(spec_.height), u.y);
   int column = x.pixel, row = y.pixel;
   if (wraps) {
@@ -139,13 +139,14 @@ void Film::splat(Vec2 at, bool wraps, Rgb value, Vec2 u) {
     if (over_pole) row = row < 0 ? -1 - row : 2 * spec_.height - 1 - row, column += spec_.width / 2;
     column = (column % spec_.width + spec_.width) % spec_.width;
   }
-  if (column < spec_.x0 || column >= spec_.x1 || row < spec_.y0 || row >= spec_.y1) return;
+  if (column < spec_.x0 || column >= spec_.x1 || row < spec_.y0 || row >= spec_.y1) return false;
   value *= x.weight * y.weight * spec_.exposure;
   if (!is_finite(value)) {
     ++bad_samples_;
-    return;
+    return false;
   }
   splats_->add(size_t(row - spec_.y0) * size_t(spec_.region_width()) + size_t(column - spec_.x0), value);
+  return true;
 }
 
 void Film::read(const std::string& pass, float* out) const {

@@ -67,8 +67,9 @@ class Film {
   void add_row(int tile, int y, int pass, const PixelSample* samples);
 
   // Light that falls on the film at `at`, over the full frame as Camera::sample takes it, from any thread: `value` times the filter is a
-  // pixel's estimate. Belongs to one pixel, drawn by the filter with `u`. `wraps`: film_wraps of the camera.
-  void splat(Vec2 at, bool wraps, Rgb value, Vec2 u);
+  // pixel's estimate. Belongs to one pixel, drawn by the filter with `u`. `wraps`: film_wraps of the camera. Returns
+  // whether there is such a pixel.
+  bool splat(Vec2 at, bool wraps, Rgb value, Vec2 u);
   // Before the first splat. `unit`: see Splats.
   void start_splats(double unit);
   void end_splats(bool finished);  // of each pass

@@ -3,6 +3,8 @@
 // other are drawn from those of several light subpaths, which the weights take as so many samples [Veach 1997, §9.2.1; Popov 2015].
 // Vertex connection and merging adds one more way: eye vertices are merged with light vertices nearby [Georgiev et al. 2012]; merging
 // alone is progressive photon mapping.
+#include <bit>
+
 #include "integrators/integrator.h"
 #include "transport/camera_path.h"
 #include "transport/light_choice.h"
@@ -72,7 +74,9 @@ class BdptIntegrator final : public Integrator {
     const FilmSpec& spec = film.spec();
     if (pass == 0) film.start_splats(splat_unit(context));
     s_.footprint = {context.camera, spec.width, spec.height};
+    if (merging_.paths > 0) set_radius(context, pass, film);
     if (merging_.paths > 0) send_photons(context, pass, film);
+    tile_trials_.resize(film.tiles().size());
     const auto from_light = [&](const Tile& tile) {
       if (!merging_.alone) shine(context, pass, film, tile, tile_light());
     };
@@ -82,38 +86,75 @@ class BdptIntegrator final : public Integrator {
     };
     for_each_tile(context, pass, film, from_light, from_eye);
     film.end_splats(!context.cancelled);
+    if (!context.cancelled) aim(pass + 1);
   }
 
  private:
+  using Trials = std::vector<EmissionGuide::Trial>;
+
   // Of the thread. Asked for by a function, since only what passes the declaration of a thread's variable makes one and ends it.
   static TileLight& tile_light() {
     static thread_local TileLight light;
     return light;
   }
 
-  // What eye vertices of this pass will be merged with. Their paths are not those that are joined, so there may be as many as wished; they
-  // aim at what is seen, which the weights know nothing of.
-  void send_photons(const RenderContext& context, int pass, const Film& film) {
-    constexpr uint8_t kClasses = kCausticPhoton | kGlobalPhoton;
-    const int paths = std::min(merging_.paths, film.spec().region_width() * film.spec().region_height());
-    const double scale = merging_.radius * std::sqrt(shrinking(pass, merging_.alpha));
-    s_.merges = float(double(paths) * sqr(scale) * double(kPi) / double(s_.joined));
-    SubpathSettings light = s_;
-    if (guide_is_old_) {
-      light.guide = nullptr;
-      guide_ = learn_emission(context, light, paths, kClasses, find_seen(context, film, s_.limits, false));
-      guide_is_old_ = context.cancelled;
+  int photons_of(const Film& film) const { return std::min(merging_.paths, film.spec().region_width() * film.spec().region_height()); }
+
+  void set_radius(const RenderContext& context, int pass, const Film& film) {
+    radius_ = merging_.radius * float(std::sqrt(shrinking(pass, merging_.alpha)));
+    s_.merges = float(photons_of(film)) * sqr(radius_) * kPi / s_.joined;
+    context.log.set("radius, pixels", double(radius_));
+  }
+
+  // Light subpaths aim at where other ways leave most to them: at what they brought in earlier passes when they were joined to the lens,
+  // caustics, and what a sky sends through windows. The weights know nothing of it: they part each path among the ways to make it as if
+  // light started evenly, and any parting is right [Veach 1997, §9.2.1].
+  void aim(int passes) {
+    constexpr float kEven = 0.5f;  // connections have a use for all light
+    constexpr size_t kMost = 1 << 19;
+    for (Trials& tile : tile_trials_) {
+      if (trials_.size() < kMost) trials_.insert(trials_.end(), tile.begin(), tile.end());
+      tile.clear();
     }
-    light.guide = &guide_;
+    if (std::has_single_bit(unsigned(passes)) && trials_.size() < kMost) aim_ = EmissionGuide(trials_, kEven);
+  }
+
+  // What eye vertices of this pass will be merged with. Their paths are not those that are joined, so there may be as many as wished; they
+  // aim at what is seen and other ways leave to them.
+  void send_photons(const RenderContext& context, int pass, const Film& film) {
+    const int paths = photons_of(film);
+    constexpr float kWorthLooking = 0.02f;
+    if (pass == 0) seen_ = find_seen(context, film, s_.limits, false);
+    const int rounds = pass == 0 ? EmissionLearner::kFirstRounds : std::has_single_bit(unsigned(pass)) ? 1 : 0;
+    for (int round = 0; round < rounds && !context.cancelled; ++round)
+      photon_aim_.learn(context, s_, paths / 2, [&](const LightVertices& path, Sampler&) {
+        float worth = 0.0f;
+        for (size_t k = 0; k < path.count(); ++k) {
+          const LightVertex& v = path[k];
+          const float share = v.is_first() || v.bsdf.is_delta() ? 0.0f : share_of_merging(v);
+          if (share > kWorthLooking && seen_.near(v.point.position)) worth += average(v.power) * share;
+        }
+        return worth;
+      });
+    SubpathSettings light = s_;
+    light.guide = &photon_aim_.guide();
     photons_ = LightMerge(context, light, pass, paths);
-    radius_ = float(scale);
     context.log.set("photons", double(photons_.size()));
-    context.log.set("radius, pixels", scale);
+  }
+
+  // The weight of merging at a light vertex, against the ways that lie on the light's side.
+  float share_of_merging(const LightVertex& v) const {
+    if (merging_.alone) return 1.0f;
+    const float merged = s_.merged(v.point.position);
+    return merged / (merged + v.weights.vcm + s_.heuristic(kInvPi) * v.weights.vc);
   }
 
   // The light subpaths of a tile.
-  void shine(const RenderContext& context, int pass, Film& film, const Tile& tile, TileLight& light) const {
+  void shine(const RenderContext& context, int pass, Film& film, const Tile& tile, TileLight& light) {
+    Trials& trials = tile_trials_[size_t(&tile - film.tiles().data())];
     const FilmSpec& spec = film.spec();
+    SubpathSettings settings = s_;
+    settings.guide = &aim_;
     light.key = hash_combine(context.seed, uint32_t(pass));
     light.vertices.clear();
     for (LightChoice& choice : light.choices) choice.clear();
@@ -123,20 +164,22 @@ class BdptIntegrator final : public Integrator {
         const uint32_t pixel = uint32_t(spec.y0 + y) * uint32_t(spec.width) + uint32_t(spec.x0 + x);
         Sampler sampler = light_sampler(context, pass, spec.width * spec.height, pixel);
         const size_t first = light.vertices.count(), group = light.group(x, y);
-        trace_from_light(context, s_, sampler, light.vertices);
+        trace_from_light(context, settings, sampler, light.vertices);
         ++light.counts[group];
         for (size_t k = first; s_.limits.total > 0 && k < light.vertices.count(); ++k)
           if (strategies_.shows(light.vertices[k].s())) light.choices[group].add(light.vertices[k], uint32_t(k));
-        splat(context, film, sampler, light.vertices, first);
+        const float worth = splat(context, film, sampler, light.vertices, first);
+        if (worth > 0.0f) trials.push_back({light.vertices.start, worth});
       }
     }
   }
 
-  // t = 1: the light subpath from vertex `first` on joined to the lens.
-  void splat(const RenderContext& context, Film& film, Sampler& sampler, const LightVertices& vertices, size_t first) const {
+  // t = 1: what the light subpath from vertex `first` on adds to the film. Returns how much that is.
+  float splat(const RenderContext& context, Film& film, Sampler& sampler, const LightVertices& vertices, size_t first) const {
     const FilmSpec& spec = film.spec();
     const int pixels = spec.width * spec.height;
     const float count = float(spec.region_width() * spec.region_height());  // light subpaths of a pass
+    float worth = 0.0f;
     for (size_t k = first; k < vertices.count(); ++k) {
       const LightVertex& v = vertices[k];
       sampler.jump_to(uint32_t(k - first) + 1);
@@ -151,9 +194,11 @@ class BdptIntegrator final : public Integrator {
       if (!(u_pixel.x < alpha)) continue;
       u_pixel.x /= alpha;
       const Rgb value = c->value * passage_to_lens(context, s_.limits, v, c->lens) * (weight / (alpha * count));
-      film.splat(c->lens.film, film_wraps(context.camera), clamp_contribution(value, v.is_first() ? clamp_direct_ : clamp_indirect_),
-                 u_pixel);
+      if (film.splat(c->lens.film, film_wraps(context.camera), clamp_contribution(value, v.is_first() ? clamp_direct_ : clamp_indirect_),
+                     u_pixel))
+        worth += average(value);
     }
+    return worth;
   }
 
   void trace(const RenderContext& context, const Film& film, const CameraRay& camera, const TileLight& light, size_t group,
@@ -419,8 +464,11 @@ class BdptIntegrator final : public Integrator {
   Merging merging_;
   int min_bounces_;
   float clamp_direct_, clamp_indirect_;
-  EmissionGuide guide_;
-  bool guide_is_old_ = true;
+  EmissionGuide aim_;
+  Trials trials_;                    // of light subpaths, by what the lens saw of them
+  std::vector<Trials> tile_trials_;  // of the pass
+  EmissionLearner photon_aim_;
+  SeenPoints seen_;
   LightMerge photons_;
   float radius_ = 0;  // within which they are merged in this pass, pixels
 };

@@ -23,7 +23,7 @@ constexpr int kMostHalvings = 12;    // of one axis
 // particles bring all or nothing, and not led astray by the few that bring much. A box's mass is that times its volume.
 struct EmissionGuide::Builder {
   std::vector<Node>& nodes;
-  double whole;
+  double whole, even;
 
   struct Box {
     EmissionNumbers low{};
@@ -71,20 +71,20 @@ struct EmissionGuide::Builder {
   // Mixes even numbers in.
   void share(uint32_t index, double volume, double total) {
     Node& n = nodes[index];
-    n.mass = (1.0 - double(kEven)) * n.mass / total + double(kEven) * volume;
+    n.mass = (1.0 - even) * n.mass / total + even * volume;
     if (n.first == 0) return;
     for (uint32_t c : {n.first, n.first + 1}) share(c, 0.5 * volume, total);
     n.lower = float(nodes[n.first].mass / n.mass);
   }
 };
 
-EmissionGuide::EmissionGuide(std::vector<Trial> trials) {
+EmissionGuide::EmissionGuide(std::vector<Trial> trials, float even) {
   std::erase_if(trials, [](const Trial& t) { return !(t.worth > 0.0f) || !std::isfinite(t.worth); });
   double sum = 0;
   for (const Trial& t : trials) sum += double(t.worth);
   if (!(sum > 0)) return;
   nodes_.resize(1);
-  Builder builder{nodes_, std::sqrt(sum)};
+  Builder builder{nodes_, std::sqrt(sum), double(even)};
   builder.grow(0, trials, {}, sum);
   builder.share(0, 1.0, nodes_[0].mass);
 }

@@ -20,9 +20,10 @@ class EmissionGuide {
   };
 
   EmissionGuide() = default;  // changes nothing
-  explicit EmissionGuide(std::vector<Trial> trials);
+  // `even`: the share that is drawn evenly all the same.
+  explicit EmissionGuide(std::vector<Trial> trials, float even = kEven);
 
-  // Turns even numbers into ones of the learnt density, and returns 1 / density. That is never below kEven: nothing is ruled out.
+  // Turns even numbers into ones of the learnt density, and returns 1 / density. That is never below `even`: nothing is ruled out.
   float warp(EmissionNumbers& u) const;
   static constexpr float kEven = 0.15f;
 

@@ -21,11 +21,12 @@ LightMerge::LightMerge(const RenderContext& context, const SubpathSettings& sett
     Vec3 position;
     MergeVertex vertex;
   };
-  const auto found = joined(
-      trace_light_paths<std::vector<Found>>(context, settings, pass, paths, [](const LightVertices& path, std::vector<Found>& batch) {
-        for (size_t i = 0; i < path.count(); ++i)
-          if (!path[i].bsdf.is_delta()) batch.push_back({path[i].point.position, MergeVertex(path[i])});
-      }));
+  const auto found = joined(trace_light_paths<std::vector<Found>>(context, settings, pass, paths,
+                                                                  [](const LightVertices& path, Sampler&, std::vector<Found>& batch) {
+                                                                    for (size_t i = 0; i < path.count(); ++i)
+                                                                      if (!path[i].bsdf.is_delta())
+                                                                        batch.push_back({path[i].point.position, MergeVertex(path[i])});
+                                                                  }));
   std::vector<Vec3> positions;
   positions.reserve(found.size());
   for (const Found& f : found) positions.push_back(f.position);

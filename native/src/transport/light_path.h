@@ -26,8 +26,8 @@ void for_each_light_path(const RenderContext& context, int pass, int count, cons
   });
 }
 
-// Follows `count` light paths of a pass in batches, in threads, and calls f(vertices, what the paths of the batch are given to). The
-// batches' order is that of the paths.
+// Follows `count` light paths of a pass in batches, in threads, and calls f(vertices, sampler, what the paths of the batch are given to).
+// The batches' order is that of the paths.
 template <class Batch, class F>
 std::vector<Batch> trace_light_paths(const RenderContext& context, const SubpathSettings& settings, int pass, int count, const F& f) {
   constexpr int kBatch = 1024;
@@ -38,7 +38,7 @@ std::vector<Batch> trace_light_paths(const RenderContext& context, const Subpath
       Sampler sampler = light_sampler(context, pass, count, uint32_t(k));
       path.clear();
       trace_from_light(context, settings, sampler, path);
-      f(path, found[size_t(b)]);
+      f(path, sampler, found[size_t(b)]);
     }
   });
   return found;
@@ -54,5 +54,36 @@ std::vector<T> joined(std::vector<std::vector<T>> batches) {
   for (auto& batch : batches) all.insert(all.end(), batch.begin(), batch.end()), std::vector<T>().swap(batch);
   return all;
 }
+
+// Learns where light paths should start, from rounds of trial paths.
+class EmissionLearner {
+ public:
+  explicit EmissionLearner(float even = EmissionGuide::kEven) : even_(even) {}
+  const EmissionGuide& guide() const { return guide_; }
+
+  // One more round, of about `count` paths; worth(vertices, sampler) says what each brings.
+  template <class Worth>
+  void learn(const RenderContext& context, SubpathSettings settings, int count, const Worth& worth) {
+    constexpr int kFewest = 1000, kMost = 40000;
+    settings.guide = &guide_;
+    // Numbered apart from the paths that count: what is learnt from a path must not decide on the same path.
+    const int pass = -++rounds_;
+    const auto found = trace_light_paths<Trials>(context, settings, pass, std::clamp(count, kFewest, kMost),
+                                                 [&](const LightVertices& path, Sampler& sampler, Trials& batch) {
+                                                   const float brought = worth(path, sampler);
+                                                   if (brought > 0.0f) batch.push_back({path.start, brought});
+                                                 });
+    for (const auto& part : found) trials_.insert(trials_.end(), part.begin(), part.end());
+    guide_ = EmissionGuide(trials_, even_);
+  }
+  static constexpr int kFirstRounds = 3;  // before the first paths that count
+
+ private:
+  using Trials = std::vector<EmissionGuide::Trial>;
+  float even_;
+  int rounds_ = 0;
+  Trials trials_;
+  EmissionGuide guide_;
+};
 
 }  // namespace gi

@@ -80,8 +80,8 @@ Vec3 PackedDirection::unpack() const {
 }
 
 std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes) {
-  return joined(
-      trace_light_paths<std::vector<Photon>>(context, settings, pass, count, [&](const LightVertices& path, std::vector<Photon>& photons) {
+  return joined(trace_light_paths<std::vector<Photon>>(
+      context, settings, pass, count, [&](const LightVertices& path, Sampler&, std::vector<Photon>& photons) {
         for (int i = 0; i < int(path.count()); ++i) {
           const LightVertex& v = path[size_t(i)];
           const Rgb power = power_of(v, settings, classes);
@@ -129,29 +129,19 @@ SeenPoints find_seen(const RenderContext& context, const Film& film, const Bounc
   return SeenPoints(all, context.pool);
 }
 
-EmissionGuide learn_emission(const RenderContext& context, SubpathSettings settings, int photons, uint8_t classes, const SeenPoints& seen) {
-  constexpr int kRounds = 3;
-  EmissionGuide guide;
-  std::vector<EmissionGuide::Trial> trials;
-  const int count = std::clamp(photons / 8, 1000, 40000);
-  for (int round = 0; round < kRounds && !context.cancelled; ++round) {
-    settings.guide = &guide;
-    // Numbered apart from the paths that count: what is learnt from a path must not decide on the same path.
-    const int pass = -1 - round;
-    const auto found =
-        trace_light_paths<std::vector<EmissionGuide::Trial>>(context, settings, pass, count, [&](const LightVertices& path, auto& trials) {
-          float worth = 0.0f;
-          for (int i = 0; i < int(path.count()); ++i) {
-            const LightVertex& v = path[size_t(i)];
-            const Rgb power = power_of(v, settings, classes);
-            if (!is_black(power) && seen.near(v.point.position)) worth += average(power);
-          }
-          if (worth > 0.0f) trials.push_back({path.start, worth});
-        });
-    for (const auto& part : found) trials.insert(trials.end(), part.begin(), part.end());
-    guide = EmissionGuide(trials);
-  }
-  return guide;
+EmissionGuide learn_emission(const RenderContext& context, const SubpathSettings& settings, int photons, uint8_t classes,
+                             const SeenPoints& seen) {
+  EmissionLearner learner;
+  for (int round = 0; round < EmissionLearner::kFirstRounds && !context.cancelled; ++round)
+    learner.learn(context, settings, photons / 8, [&](const LightVertices& path, Sampler&) {
+      float worth = 0.0f;
+      for (int i = 0; i < int(path.count()); ++i) {
+        const Rgb power = power_of(path[size_t(i)], settings, classes);
+        if (!is_black(power) && seen.near(path[size_t(i)].point.position)) worth += average(power);
+      }
+      return worth;
+    });
+  return learner.guide();
 }
 
 PhotonMap::PhotonMap(std::vector<Photon> photons, double paths, ThreadPool& pool) : scale_(float(1.0 / paths)) {

@@ -56,7 +56,8 @@ double shrinking(int pass, double alpha);
 SeenPoints find_seen(const RenderContext& context, const Film& film, const BounceLimits& limits, bool gathers);
 
 // Learns to send photons of `classes` to what is seen.
-EmissionGuide learn_emission(const RenderContext& context, SubpathSettings settings, int photons, uint8_t classes, const SeenPoints& seen);
+EmissionGuide learn_emission(const RenderContext& context, const SubpathSettings& settings, int photons, uint8_t classes,
+                             const SeenPoints& seen);
 
 // Whether what lies `away` is taken to be of the same surface: of like slope, and not off the plane.
 inline bool of_one_surface(Vec3 away, Vec3 its_normal, Vec3 normal, float radius) {
