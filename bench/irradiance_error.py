@@ -63,13 +63,13 @@ def relative_error(found, references) -> float:
     return float(np.sqrt(max(square.mean(), 0.0)))
 
 
-def draw(table) -> str:
-    """Error over the error allowed, both logarithmic, a line for each number of rays."""
-    width, height, left, bottom = 520, 340, 60, 40
+def draw(table, across, along, title, unit) -> str:
+    """Errors, by (of `across`, of `along`): over `across`, both logarithmic, a line for each of `along`, a number of `unit`."""
+    width, height, left, right, bottom = 560, 340, 60, 140, 40
     low, high = 1e-3, 1.0
 
-    def x(error):
-        return left + (width - left - 100) * np.log(error / ERRORS[-1]) / np.log(ERRORS[0] / ERRORS[-1])
+    def x(value):
+        return left + (width - left - right) * np.log(value / min(across)) / np.log(max(across) / min(across))
 
     def y(value):
         return (height - bottom) * (1 - np.log(max(value, low) / low) / np.log(high / low)) + 5
@@ -79,18 +79,16 @@ def draw(table) -> str:
     ]
     out.append(f'<rect width="{width}" height="{height}" fill="white"/>')
     for value, name in ((1e-3, "0.1 %"), (1e-2, "1 %"), (1e-1, "10 %"), (1.0, "100 %")):
-        out.append(f'<path d="M{left} {y(value):.0f}H{width - 100}" stroke="#ccc"/>')
+        out.append(f'<path d="M{left} {y(value):.0f}H{width - right}" stroke="#ccc"/>')
         out.append(f'<text x="{left - 8}" y="{y(value) + 4:.0f}" text-anchor="end">{name}</text>')
-    for error in ERRORS:
-        out.append(f'<text x="{x(error):.0f}" y="{height - 18}" text-anchor="middle">{error}</text>')
-    out.append(
-        f'<text x="{(width + left - 100) / 2}" y="{height - 3}" text-anchor="middle">Error allowed (\u03b1)</text>'
-    )
-    for samples, color in zip(SAMPLES, COLORS, strict=True):
-        points = " ".join(f"{x(e):.1f},{y(table[e, samples][0]):.1f}" for e in ERRORS)
+    for value in across:
+        out.append(f'<text x="{x(value):.0f}" y="{height - 18}" text-anchor="middle">{value:g}</text>')
+    out.append(f'<text x="{(width + left - right) / 2}" y="{height - 3}" text-anchor="middle">{title}</text>')
+    for line, color in zip(along, COLORS, strict=False):
+        points = " ".join(f"{x(v):.1f},{y(table[v, line]):.1f}" for v in across)
         out.append(f'<polyline points="{points}" fill="none" stroke="{color}" stroke-width="2"/>')
-        last = y(table[ERRORS[0], samples][0])
-        out.append(f'<text x="{width - 92}" y="{last + 4:.0f}" fill="{color}">{samples} rays</text>')
+        last = y(table[max(across), line])
+        out.append(f'<text x="{width - right + 8}" y="{last + 4:.0f}" fill="{color}">{line:,} {unit}</text>')
     return "\n".join([*out, "</svg>"]) + "\n"
 
 
@@ -107,9 +105,9 @@ def main():
     for error in ERRORS:
         for samples in SAMPLES:
             found, took = picture(scene, "irradiance_cache", 1, options.passes, error=error, record_samples=samples)
-            table[error, samples] = relative_error(found, references), took
-            print(f"{error} {samples:5} {100 * table[error, samples][0]:.2f} % {took:.1f} s", flush=True)
-    PICTURE.write_text(draw(table), encoding="utf-8")
+            table[error, samples] = relative_error(found, references)
+            print(f"{error} {samples:5} {100 * table[error, samples]:.2f} % {took:.1f} s", flush=True)
+    PICTURE.write_text(draw(table, ERRORS, SAMPLES, "Error allowed (\u03b1)", "rays"), encoding="utf-8")
     os._exit(0)  # Blender's module can hang at exit
 
 

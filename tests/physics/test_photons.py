@@ -89,6 +89,16 @@ def test_integrating_sphere(way):
 
 
 @pytest.mark.parametrize("way", WAYS)
+def test_bounces_are_counted(way):
+    """In that sphere with one bounce between surfaces: of 1/2 + 1/4 + 1/8 … the first two."""
+    scene = scene_of(
+        (sphere(rings=32), surface(0.5)), lights=[lamp("POINT", (4 * math.pi**2,) * 3, matrix=matrix((0, 0, 0)))]
+    )
+    mean, error = repeated(way, scene, (0.2, 0.1, 0), (0.5, 0.3, 0.7), width=0.05, diffuse_bounces=1)
+    assert abs(mean - 0.75) < 4 * error + 0.01
+
+
+@pytest.mark.parametrize("way", WAYS)
 def test_two_squares(way):
     """Unit squares face to face, 1 m apart, emittance 1 below, albedos .5 and .8: radiosity in the middles."""
     low = quad((-0.5, -0.5, 0), (0.5, -0.5, 0), (0.5, 0.5, 0), (-0.5, 0.5, 0))

@@ -12,7 +12,15 @@
 namespace gi {
 namespace {
 
-// Irradiance at every few photons, looked up by the nearest. [Christensen 1999, "Faster photon map global illumination"]
+// What eye rays are when they come from gathering.
+PathState gathering() {
+  PathState eye;
+  eye.depth = eye.diffuse_depth = 1;
+  return eye;
+}
+
+// Irradiance at every few photons, as gathering rays see it, looked up by the nearest. [Christensen 1999, "Faster photon map global
+// illumination"]
 class IrradianceMap {
  public:
   IrradianceMap() = default;
@@ -24,9 +32,10 @@ class IrradianceMap {
       positions.push_back(map.position(k));
     }
     constexpr size_t kBatch = 256;
+    const PathState eye = gathering();
     context.pool.for_each(int((records_.size() + kBatch - 1) / kBatch), context.cancelled, [&](int b) {
       for (size_t k = size_t(b) * kBatch; k < std::min((size_t(b) + 1) * kBatch, records_.size()); ++k)
-        records_[k].irradiance = map.irradiance(positions[k], records_[k].normal, radius_, count);
+        records_[k].irradiance = map.irradiance(positions[k], records_[k].normal, radius_, count, eye);
     });
     tree_ = PointTree(positions, context.pool);
     std::vector<Record> in_order;
@@ -123,7 +132,7 @@ class PhotonMapIntegrator final : public Integrator {
             if (shows_photons && point.path.depth == 0) show_photons(point, result);
             const Rgb global = light_of(point, bsdf, [&](Vec3 normal) {
               return s_.gathers ? irradiance_.at(point.position, normal)
-                                : global_.map.irradiance(point.position, normal, global_.reach, global_.count);
+                                : global_.map.irradiance(point.position, normal, global_.reach, global_.count, point.path);
             });
             return KnownLight{gathered ? Rgb() : caustics(point, bsdf), global};
           });
@@ -202,10 +211,11 @@ class PhotonMapIntegrator final : public Integrator {
     constexpr size_t kFewest = 10, kMost = 5000;
     stock.count = count, stock.reach = typical_spread(stock.map, count);
     if (goal_ <= 0.0) return {};
-    const double noise = stock.map.error(stock.reach, count).noise, wished = goal_ * std::sqrt(0.5);
+    const PathState eye = s_.gathers ? gathering() : PathState();
+    const double noise = stock.map.error(stock.reach, count, eye).noise, wished = goal_ * std::sqrt(0.5);
     stock.count = std::clamp(size_t(double(count) * sqr(noise / wished)), kFewest, kMost);
     stock.reach = typical_spread(stock.map, stock.count);
-    return stock.map.error(stock.reach, stock.count);
+    return stock.map.error(stock.reach, stock.count, eye);
   }
 
   static std::string percent(double x) {

@@ -34,7 +34,7 @@ class LightMerge {
     const float per_area = 1.0f / (float(paths_) * kPi * radius_squared);
     tree_.within(position, radius_squared, [&](uint32_t k, float) {
       const MergeVertex& v = vertices_[k];
-      if (!of_one_surface(tree_.point(k) - position, v.normal.unpack(), normal, radius)) return;
+      if (!of_one_surface(tree_.point(k) - position, v.normal.along(), normal, radius)) return;
       f(v, Rgb(v.power[0], v.power[1], v.power[2]) * per_area);
     });
   }

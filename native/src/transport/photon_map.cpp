@@ -38,15 +38,17 @@ float cross2(Vec2 a, Vec2 b) { return a.x * b.y - a.y * b.x; }
 // Area of the convex hull; reorders the points. [Andrew 1979]
 float hull_area(std::vector<Vec2>& points) {
   std::sort(points.begin(), points.end(), [](Vec2 a, Vec2 b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
+  static thread_local std::vector<Vec2> kept;
+  kept.resize(points.size());
+  Vec2* const chain = kept.data();
   float twice = 0;
   for (const float side : {1.0f, -1.0f}) {
-    static thread_local std::vector<Vec2> chain;
-    chain.clear();
+    size_t n = 0;
     for (const Vec2 p : points) {
-      while (chain.size() > 1 && side * cross2(chain.back() - chain[chain.size() - 2], p - chain.back()) <= 0.0f) chain.pop_back();
-      chain.push_back(p);
+      while (n > 1 && side * cross2(chain[n - 1] - chain[n - 2], p - chain[n - 1]) <= 0.0f) --n;
+      chain[n++] = p;
     }
-    for (size_t i = 1; i < chain.size(); ++i) twice += side * cross2(chain[i - 1], chain[i]);
+    for (size_t i = 1; i < n; ++i) twice += side * cross2(chain[i - 1], chain[i]);
   }
   return 0.5f * twice;
 }
@@ -73,10 +75,10 @@ PackedDirection::PackedDirection(Vec3 w) {
   u = int16_t(std::lrint(x * 32767.0f)), v = int16_t(std::lrint(y * 32767.0f));
 }
 
-Vec3 PackedDirection::unpack() const {
+Vec3 PackedDirection::along() const {
   const float x = float(u) / 32767.0f, y = float(v) / 32767.0f, z = 1.0f - std::abs(x) - std::abs(y);
-  if (z >= 0.0f) return normalize({x, y, z});
-  return normalize({(1.0f - std::abs(y)) * sign_of(x), (1.0f - std::abs(x)) * sign_of(y), z});
+  if (z >= 0.0f) return {x, y, z};
+  return {(1.0f - std::abs(y)) * sign_of(x), (1.0f - std::abs(x)) * sign_of(y), z};
 }
 
 std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes) {
@@ -180,16 +182,17 @@ std::vector<Photon> PhotonMap::photons() const {
   return all;
 }
 
-PhotonError PhotonMap::error(float radius, size_t count) const {
+PhotonError PhotonMap::error(float radius, size_t count, const PathState& eye) const {
   const size_t probes = std::min<size_t>(512, size());
   double noise = 0, difference = 0;
   size_t lit = 0;
   for (size_t i = 0; i < probes; ++i) {
     const size_t k = i * size() / probes;
-    const Rgb all = irradiance(position(k), normal(k), radius, count), half = irradiance(position(k), normal(k), radius, count / 2);
+    const Rgb all = irradiance(position(k), normal(k), radius, count, eye),
+              half = irradiance(position(k), normal(k), radius, count / 2, eye);
     if (is_black(all)) continue;
     double sum = 0, squares = 0;
-    for (const auto& f : around(position(k), normal(k), radius, count)) {
+    for (const auto& f : around(position(k), normal(k), radius, count, eye)) {
       const float* power = lights_[f.point].power;
       const double mean = power[0] + power[1] + power[2];
       sum += mean, squares += mean * mean;
@@ -212,7 +215,7 @@ float PhotonMap::spread(Vec3 position, size_t count) const {
 }
 
 bool PhotonMap::is_of(uint32_t k, Vec3 position, Vec3 normal, float radius) const {
-  return of_one_surface(tree_.point(k) - position, lights_[k].normal.unpack(), normal, radius);
+  return of_one_surface(tree_.point(k) - position, lights_[k].normal.along(), normal, radius);
 }
 
 // f Φ: irradiance is by the true normal, whatever normals the lobes weigh light by.
@@ -257,19 +260,21 @@ Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radiu
   return sum * (3.0f * scale_ / (kPi * sqr(end)));
 }
 
-const std::vector<PointTree::Found>& PhotonMap::around(Vec3 position, Vec3 normal, float radius, size_t count) const {
+const std::vector<PointTree::Found>& PhotonMap::around(Vec3 position, Vec3 normal, float radius, size_t count, const PathState& eye) const {
   static thread_local std::vector<PointTree::Found> found;
-  PathState eye;
-  eye.depth = eye.diffuse_depth = 1;
-  tree_.nearest(position, count, sqr(radius), found, [&](uint32_t k) {
+  const auto is_good = [&](uint32_t k) {
     const PhotonLight& photon = lights_[k];
-    return photon.reaches(eye) && dot(photon.normal.unpack(), normal) > 0.0f && is_of(k, position, normal, radius);
-  });
+    return photon.reaches(eye) && dot(photon.normal.along(), normal) > 0.0f && is_of(k, position, normal, radius);
+  };
+  for (const float reach : {0.6f * radius, radius}) {  // mostly the smaller one will do
+    tree_.nearest(position, count, sqr(reach), found, is_good);
+    if (found.size() == count) break;
+  }
   return found;
 }
 
-Rgb PhotonMap::irradiance(Vec3 position, Vec3 normal, float radius, size_t count) const {
-  const std::vector<PointTree::Found>& found = around(position, normal, radius, count);
+Rgb PhotonMap::irradiance(Vec3 position, Vec3 normal, float radius, size_t count, const PathState& eye) const {
+  const std::vector<PointTree::Found>& found = around(position, normal, radius, count, eye);
   if (found.empty()) return Rgb();
   float end = 0.0f;
   for (const auto& f : found) end = std::max(end, f.distance_squared);

@@ -15,7 +15,8 @@ struct PackedDirection {
   int16_t u = 0, v = 0;
   PackedDirection() = default;
   explicit PackedDirection(Vec3 w);
-  Vec3 unpack() const;
+  Vec3 unpack() const { return normalize(along()); }
+  Vec3 along() const;  // of any length
 };
 
 struct PhotonLight {
@@ -59,11 +60,11 @@ SeenPoints find_seen(const RenderContext& context, const Film& film, const Bounc
 EmissionGuide learn_emission(const RenderContext& context, const SubpathSettings& settings, int photons, uint8_t classes,
                              const SeenPoints& seen);
 
-// Whether what lies `away` is taken to be of the same surface: of like slope, and not off the plane.
+// Whether what lies `away` is taken to be of the same surface: of like slope, and not off the plane. Its normal may have any length.
 inline bool of_one_surface(Vec3 away, Vec3 its_normal, Vec3 normal, float radius) {
   constexpr float kSlope = 0.8f;      // least cosine between the normals
   constexpr float kThickness = 0.3f;  // how far off the plane, of the radius
-  return abs_dot(away, normal) < kThickness * radius && abs_dot(its_normal, normal) > kSlope;
+  return abs_dot(away, normal) < kThickness * radius && sqr(dot(its_normal, normal)) > sqr(kSlope) * length_squared(its_normal);
 }
 
 // How far estimates by the nearest photons are off on average, relative, where photons lie.
@@ -89,12 +90,12 @@ class PhotonMap {
   Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius) const;
   // By the nearest `count` of those within `radius`, weighed by a cone that ends at the farthest. [Jensen 2001, eq. 7.8]
   Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count) const;
-  // Power per area on the side of `normal`, by the nearest `count` within `radius`; of those that reach an eye one diffuse bounce away.
-  Rgb irradiance(Vec3 position, Vec3 normal, float radius, size_t count) const;
+  // Power per area on the side of `normal`, by the nearest `count` within `radius` of those that reach `eye`.
+  Rgb irradiance(Vec3 position, Vec3 normal, float radius, size_t count, const PathState& eye) const;
   // How many lie within `radius`.
   size_t count(Vec3 position, Vec3 normal, float radius) const;
   // Of irradiance by `count` within `radius`: noise by the photons' powers, blur by the difference that half of them make.
-  PhotonError error(float radius, size_t count) const;
+  PhotonError error(float radius, size_t count, const PathState& eye) const;
   // The distance of the `count`-th photon.
   float spread(Vec3 position, size_t count) const;
 
@@ -102,7 +103,7 @@ class PhotonMap {
   bool is_of(uint32_t k, Vec3 position, Vec3 normal, float radius) const;
   Rgb scattered(const ShadingPoint& point, const Bsdf& bsdf, const PhotonLight& photon) const;
   // Those that irradiance is estimated by.
-  const std::vector<PointTree::Found>& around(Vec3 position, Vec3 normal, float radius, size_t count) const;
+  const std::vector<PointTree::Found>& around(Vec3 position, Vec3 normal, float radius, size_t count, const PathState& eye) const;
 
   std::vector<PhotonLight> lights_;  // in the order of the tree
   PointTree tree_;
