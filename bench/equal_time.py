@@ -4,7 +4,8 @@
 
 Each way renders each scene (files, or words in names of the shared scenes) for about S seconds of sampling, once per seed, in a process of
 its own. The error is the relative mean squared one, (x − r)² / (r² + (mean r / 10)²), of the worst pixels without a thousandth; `spread` is
-the same between seeds, which no difference between the engines can touch, nor what a biased way is off. The reference is a long render by
+the same between seeds, which no difference between the engines can touch, nor what a biased way is off; `blocks` the error of means over
+8 x 8 pixels, in which noise of single pixels fades and blotches stay. The reference is a long render by
 another seed and the unbiased way that is least noisy per second, or the way --by. Denoising, adaptive sampling, clamping and Filter
 Glossy are off, caustics are on, bounces are the scene's own. Replaces the scenes' rows in bench/results/equal_time.json and .md, and
 their pictures side by side."""
@@ -39,6 +40,7 @@ UNBIASED = ("bdpt", "path")  # of which one makes the reference
 HOW = ("threads", "pixels", "seeds")  # that the figures of a scene depend on
 RESULTS = ROOT / "bench" / "results"
 LIMIT = 1800  # seconds
+BLOCK = 8  # pixels
 
 
 # -------------------------------------------------------------------------------------------------- in the child
@@ -131,6 +133,11 @@ def relative_error(image: np.ndarray, reference: np.ndarray) -> float:
     return float(np.sort(errors)[: math.ceil(0.999 * len(errors))].mean())
 
 
+def in_blocks(image: np.ndarray) -> np.ndarray:
+    h, w = (n // BLOCK for n in image.shape[:2])
+    return image[: h * BLOCK, : w * BLOCK].reshape(h, BLOCK, w, BLOCK, 3).mean((1, 3))
+
+
 def spread(images: list[np.ndarray], reference: np.ndarray) -> float:
     """Relative variance of one image, by differences in pairs."""
     pairs = [(a, b) for i, a in enumerate(images) for b in images[i + 1 :]]
@@ -155,6 +162,9 @@ def measure_scene(file: Path, options) -> dict:
                     "seconds": float(np.mean([o["seconds"] for o in group])),
                     "samples": group[0]["samples"],
                     "error": float(np.mean([relative_error(o["image"], reference) for o in group])),
+                    "blocks": float(
+                        np.mean([relative_error(in_blocks(o["image"]), in_blocks(reference)) for o in group])
+                    ),
                     "spread": spread([o["image"] for o in group], reference),
                 }
             )
@@ -186,13 +196,16 @@ def table(rows: list[dict]) -> str:
         how = ", ".join(f"{row[name]} {name}" for name in HOW if name in row)
         lines += [
             f"## {row['scene']}\n\n{how}; reference by {row['reference']}\n",
-            "| way | seconds | samples | relative MSE | between seeds | MSE × time, of Cycles' | between seeds × time, of Cycles' |",
-            "|---|---|---|---|---|---|---|",
+            "| way | seconds | samples | relative MSE | of blocks | between seeds | MSE × time, of Cycles' | between seeds × time, of Cycles' |",
+            "|---|---|---|---|---|---|---|---|",
         ]
         for way, steps in row["ways"].items():
             for k, step in enumerate(steps):
                 ratios = [ratio(step, row["ways"].get("cycles", [])[k : k + 1], name) for name in ("error", "spread")]
-                figures = f"{step['seconds']:.1f} | {step['samples']} | {step['error']:.4f} | {step['spread']:.4f}"
+                blocks = f"{step['blocks']:.5f}" if "blocks" in step else "–"
+                figures = (
+                    f"{step['seconds']:.1f} | {step['samples']} | {step['error']:.4f} | {blocks} | {step['spread']:.4f}"
+                )
                 lines.append(f"| {way} | {figures} | {' | '.join(ratios)} |")
         lines.append("")
     return "\n".join(lines) + "\n"

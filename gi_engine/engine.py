@@ -117,7 +117,7 @@ class GIEngine(bpy.types.RenderEngine):
         keeping = self.keeping(depsgraph) if keeps(settings) and not self.is_preview else None
         tables = keeping.tables if keeping else None
         path = (control.current.path if control.current else _path) if keeping and tables is None else ()
-        with Session(scene, settings, kept=tables, path=path) as session:
+        with Session(scene, settings, kept=tables, path=path, steady=bool(keeping and keeping.steady)) as session:
             self.exported.scene = None  # the native side has taken what it needs
             for message in session.warnings():
                 self.warn(message)

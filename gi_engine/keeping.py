@@ -40,6 +40,7 @@ class Keeping:
         self.descriptor = next(d for d in native.integrators() if d["id"] == settings.integrator)
         self.memory, self.key, self.path = memory, key, path
         self.tables: dict[str, np.ndarray] | None = None
+        self.steady = False  # what the last frame showed is shown the same
         self.messages: list[str] = []
         self.warnings: list[str] = []
         self.content = content.content_of(scene, settings)
@@ -56,6 +57,7 @@ class Keeping:
             self.messages.append(f"nothing is kept of the last render: {reason}")
             return False
         self.path = kept.path if self.path is not None else None
+        self.steady = True
         return True
 
     def from_file(self, misfit: str) -> None:

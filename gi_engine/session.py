@@ -18,9 +18,17 @@ class Session:
     """Owns the native scene and session. Use as a context manager: leaving it stops the threads."""
 
     def __init__(
-        self, scene: Scene, settings: Settings, lightmap: Lightmap | None = None, built=None, kept=None, path=()
+        self,
+        scene: Scene,
+        settings: Settings,
+        lightmap: Lightmap | None = None,
+        built=None,
+        kept=None,
+        path=(),
+        steady=False,
     ):
-        """`kept`: tables that a session like this one kept; `path`: Cameras of other frames."""
+        """`kept`: tables that a session like this one kept, to be used as they are where it is `steady`; `path`: Cameras of
+        other frames."""
         self.scene = scene
         try:
             self.native_scene = built or native.build_scene(scene, settings.threads)
@@ -28,6 +36,8 @@ class Session:
             if kept:
                 self.native.take_over(kept)
             self.native.look_along(list(path))
+            if steady:
+                self.native.stay_steady()
         except native.NativeMissing:
             raise
         except (ValueError, RuntimeError) as error:  # bad input, a library that fails

@@ -54,15 +54,21 @@ def test_a_cache_is_kept_and_taken_over(gi, room, tmp_path):
     first = gi("render", file, "-o", out, "--cache", cache, *HERE)
     assert (first.code, first.err) == (cli.DONE, "")
     picture = combined(out)
-    kept = kept_file.read(cache, "irradiance_cache", 1)
+    kept = kept_file.read(cache, "irradiance_cache", 2)
     assert sum(len(t) for name, t in kept.tables.items() if name != "bounds") == records(first)
     again = gi("render", file, "-o", out, "--cache", cache, *HERE)
     assert (again.code, again.err) == (cli.DONE, "")
     assert records(first) <= records(again) <= 1.02 * records(first)
     assert np.abs(combined(out) - picture).mean() < 0.01 * picture.mean()
     bytes_before = cache.read_bytes()
-    assert records(gi("render", file, "-o", out, "--cache", cache, *HERE)) == records(again)
+    still = ("--set", "refinement=0")
+    assert records(gi("render", file, "-o", out, "--cache", cache, *HERE, *still)) == records(again)
     assert cache.read_bytes() == bytes_before  # nothing was added
+    before = kept_file.read(cache, "irradiance_cache", 2).tables["bounce 1"]
+    assert records(gi("render", file, "-o", out, "--cache", cache, *HERE)) == records(again)
+    after = kept_file.read(cache, "irradiance_cache", 2).tables["bounce 1"]
+    assert (after[:, -1] >= before[:, -1]).all()  # rays of each record, in portions
+    assert after[:, -1].sum() > before[:, -1].sum()
     assert sorted(p.name for p in tmp_path.iterdir() if "blend" not in p.name) == ["light.cache", "out.exr"]
     # Seen from elsewhere it grows.
     assert records(gi("render", turned, "-o", out, "--cache", cache, *HERE)) > records(again)
@@ -122,7 +128,7 @@ def test_what_keeps_nothing_has_no_cache(gi, stage, tmp_path):
     done = gi("render", stage.save(), "-o", tmp_path / "out.png", "--cache", tmp_path / "x", "--integrator", "path")
     assert (done.code, done.err) == (
         cli.BAD_ARGUMENTS,
-        'gi-engine: --cache: integrator "path" has nothing to keep; these have: irradiance_cache\n',
+        'gi-engine: --cache: integrator "path" has nothing to keep; these have: photon_map, irradiance_cache\n',
     )
     done = gi("render", stage.save(), "-o", tmp_path / "out.png", "--cache", tmp_path / "missing" / "x")
     assert done.code == cli.BAD_ARGUMENTS

@@ -259,6 +259,23 @@ def test_a_smaller_error_makes_more_records_and_a_truer_picture():
     assert ((fine - reference) ** 2).mean() < ((coarse - reference) ** 2).mean()
 
 
+def test_blotches_fade_as_records_are_refined():
+    """Between seeds, and in blocks, where noise of single pixels has no say."""
+
+    def between_seeds(refinement):
+        found = []
+        for seed in range(4):
+            scene = scene_of((cube(), surface(0.6)), lights=[lamp("POINT", (9.0,) * 3, matrix=matrix((0.3, 0.2, 0.5)))])
+            scene.camera = sd.Camera("camera", "ORTHO", matrix((0, 0, 0)), (-0.9, 0.9, -0.9, 0.9), 0.0, 100.0)
+            settings = {"record_samples": 32, "refinement": refinement}
+            (image,), _ = render(scene, seed + 1, samples=128, **settings)
+            found.append(image[..., 0].reshape(4, 8, 4, 8).mean((1, 3)))
+        return float((np.var(found, 0, ddof=1) / np.mean(found, 0) ** 2).mean())
+
+    once, refined = between_seeds(0.0), between_seeds(0.5)
+    assert refined < 0.25 * once, (refined, once)
+
+
 def test_cancel_ends_the_overture():
     scene = SCENES["area lamp"]()
     scene.camera = camera()

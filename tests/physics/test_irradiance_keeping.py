@@ -45,7 +45,7 @@ def finish(session):
 def render(scene, camera, kept=None, path=(), samples=64, time_limit=0.0, pixels=PIXELS, **parameters):
     scene = dataclasses.replace(scene, camera=camera, film=sd.Film(pixels, pixels, filter="BOX", filter_width=1.0))
     settings = sd.Settings("irradiance_cache", samples, time_limit=time_limit, seed=1, threads=2, parameters=parameters)
-    session = finish(Session(scene, settings, kept=kept, path=path))
+    session = finish(Session(scene, settings, kept=kept, path=path, steady=kept is not None))
     return session.read("Combined")[..., 0].astype(np.float64), session.native.kept(), session
 
 
@@ -73,7 +73,7 @@ def test_a_still_floor_does_not_flicker():
     # Pictures move by whole pixels: the same light, the same places.
     assert np.mean(along) == pytest.approx(np.mean(alone), rel=0.02)
     before, filled, grown = (flicker(pictures, step) for pictures in (alone, along, one_by_one))
-    assert before > 2e-4  # or there is nothing to prove
+    assert before > 1e-4  # or there is nothing to prove
     assert filled < 0.02 * before, f"{filled:.2e}, without {before:.2e}"
     assert grown < 0.1 * before, f"{grown:.2e}, without {before:.2e}"
 
@@ -108,9 +108,9 @@ def test_records_near_moved_objects_are_dropped():
 def test_tables_of_something_else_are_refused():
     _, kept, _ = render(room(), eye(0), samples=1)
     for name, table, message in (
-        ("photons", np.zeros((2, 30), np.float32), "is no table of irradiance records"),
-        ("bounce 1", np.zeros((2, 29), np.float32), "is no table of irradiance records"),
-        ("bounce 1", np.full((2, 30), np.nan, np.float32), "row 0: no irradiance record"),
+        ("photons", np.zeros((2, 36), np.float32), "is no table of irradiance records"),
+        ("bounce 1", np.zeros((2, 35), np.float32), "is no table of irradiance records"),
+        ("bounce 1", np.full((2, 36), np.nan, np.float32), "row 0: no irradiance record"),
     ):
         with pytest.raises(RuntimeError, match=message):
             render(room(), eye(0), {**kept, name: table})

@@ -201,6 +201,7 @@ void bind_render(nb::module_& m) {
             s.look_along(std::move(path));
           },
           nb::arg("cameras"), "Before the start: where the camera will be in other frames.")
+      .def("stay_steady", &Session::stay_steady, "Before the start: a frame among others; what it takes over is not made better.")
       .def("kept", &kept_tables, "Once ended: what another render of the scene may take over, float32 tables (rows, columns) by name.")
       .def("start", &Session::start)
       .def("wait", &Session::wait, nb::arg("seconds"), nb::call_guard<nb::gil_scoped_release>(), "True once the render has ended.")

@@ -5,41 +5,34 @@
 #include "core/tally.h"
 #include "integrators/integrator.h"
 #include "transport/camera_path.h"
-#include "transport/irradiance_gather.h"
+#include "transport/irradiance_level.h"
 
 namespace gi {
 namespace {
 
 constexpr LightSampling kMode = LightSampling::kMis;
 constexpr int kMostLevels = 8;
-constexpr int kCoarsest = 32, kFinest = 2;        // pixels between camera rays of the overture
+constexpr int kCoarsest = 32, kFinest = 1;        // pixels between camera rays of the overture
 constexpr int kSeedStep = 4;                      // the same for deeper levels
 constexpr size_t kLeastWave = 64;                 // records
 constexpr size_t kWaveShare = 8;                  // a wave is at most this part of what is there
-constexpr float kLeastReach = 1.0f;  // pixels
 constexpr double kOvertureShare = 0.5;  // of the time limit, at most
 constexpr double kDeeperShare = 0.25;   // of what remains of that, for each level but the first
 constexpr float kSlack = 1.3f;          // times the error that is let pass where records were taken over, or each frame would add some
 constexpr float kCoarser = 2.0f;        // times the maximum spacing that a record of another frame may hold for
+constexpr size_t kRefined = 256;         // records at a time
+constexpr int kAhead = 4;                // times the passes made for which refining may have been paid
 constexpr uint32_t kSeekSalt = 0x1c5eedu, kGatherSalt = 0x1c6a74u;  // streams of their own
 
 struct CacheSettings {
   float error;
   int samples, levels;
-  float min_spacing, max_spacing;  // pixels
-  float min_length, max_length;    // metres; 0: none
+  float refinement;
+  IrradianceSpacing spacing;
   BounceLimits limits;
   float clamp_direct, clamp_indirect;
-  bool reflective_caustics, refractive_caustics;
+  uint8_t no_caustics;  // CausticFlags of what is left out
   float filter_glossy;
-};
-
-// Where a path came upon a diffuse surface: where a record may be wanted.
-struct Place {
-  Vec3 position, ng, normal;
-  float footprint = 0, spread = 0;  // of the pixel, as it is seen from here on
-  int level = 0;
-  float most = kInf;  // a radius beyond which a record is too coarse here
 };
 
 // A path under way. What it finds of luminaires and what of anything else may count differently: luminaires are sampled at every
@@ -56,25 +49,28 @@ class IrradianceCacheIntegrator final : public Integrator {
       : s_{p.real("error"),
            p.integer("record_samples"),
            p.integer("cached_bounces"),
-           p.real("min_spacing"),
-           p.real("max_spacing"),
-           p.real("min_length"),
-           p.real("max_length"),
+           p.real("refinement"),
+           {p.real("min_spacing"), p.real("max_spacing"), p.real("min_length"), p.real("max_length")},
            {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
             p.integer("transparent_bounces")},
            p.real("clamp_direct"),
            p.real("clamp_indirect"),
-           p.on("caustics_reflective"),
-           p.on("caustics_refractive"),
+           no_caustics(p),
            p.real("filter_glossy")} {}
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
-    if (caches_.empty()) play_overture(context, film);
+    if (levels_.empty())
+      play_overture(context, film);
+    else
+      refine(context, film, pass);
     if (context.cancelled) return;
+    const uint64_t rays = context.scene.rays_traced();
     for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) {
       Walk walk{CameraPath(camera)};
       trace(context, film, camera, walk, sampler, result);
     });
+    pass_rays_ += double(context.scene.rays_traced() - rays);
+    passes_ = pass + 1;
   }
 
   void finish_pass(const RenderContext& context, int) override;
@@ -89,9 +85,12 @@ class IrradianceCacheIntegrator final : public Integrator {
 
   void play_overture(const RenderContext& context, Film& film);
   void fill_level(const RenderContext& context, const Film& film, int level);
-  void seek(const RenderContext& context, const Film& film, const Camera& eye, int x, int y, int level, std::vector<Place>& places) const;
-  void fill(const RenderContext& context, const Film& film, std::vector<Place> places, int level);
-  IrradianceRecord gather(const RenderContext& context, const Film& film, const Place& place, uint32_t serial) const;
+  void seek(const RenderContext& context, const Film& film, const Camera& eye, int x, int y, int level,
+            std::vector<IrradiancePlace>& places) const;
+  void fill(const RenderContext& context, const Film& film, std::vector<IrradiancePlace> places, int level);
+  void refine(const RenderContext& context, const Film& film, int pass);
+  double rays_to_refine(const RenderContext& context, int pass) const;
+  GatheredIrradiance gather(const RenderContext& context, const Film& film, const IrradiancePlace& place, int level, uint32_t serial) const;
   bool is_late(const RenderContext& context) const { return context.time_limit > 0.0 && context.seconds() > level_ends_; }
   size_t record_count() const;
 
@@ -105,16 +104,16 @@ class IrradianceCacheIntegrator final : public Integrator {
   float error_at(int level) const { return level == 0 ? s_.error : std::min(2.0f * s_.error, 0.6f); }
   int samples_at(int level) const { return level == 0 ? s_.samples : std::max(s_.samples / 3, 32); }
 
-  uint8_t no_caustics() const {
-    return uint8_t((s_.reflective_caustics ? 0 : kNoReflectiveCaustics) | (s_.refractive_caustics ? 0 : kNoRefractiveCaustics));
-  }
-
   CacheSettings s_;
-  std::vector<IrradianceCache> caches_;  // by level
+  std::vector<IrradianceLevel> levels_;
   mutable Tally hits_, misses_;       // of the first bounce, while the picture is made
   uint32_t gathered_ = 0;                // records, those included that were not needed in the end
-  std::vector<std::vector<IrradianceRecord>> taken_over_;  // by level
+  std::vector<std::vector<float>> taken_over_;  // rows, by level
+  size_t refined_ = 0;                   // records, all levels' in turn
+  double refining_rays_ = 0, pass_rays_ = 0;
+  int passes_ = 0;
   float slack_ = 1.0f;
+  double overture_seconds_ = 0;
   double level_ends_ = 0;                // seconds after which no more records are begun, where there is a time limit
 };
 
@@ -128,7 +127,7 @@ std::optional<Rgb> IrradianceCacheIntegrator::read(const ShadingPoint& point, co
     const Rgb albedo = bsdf.diffuse_albedo(point.wo, side);
     if (is_black(albedo)) continue;
     const float sign = side == kReflection ? 1.0f : -1.0f;
-    const auto found = caches_[size_t(level)].find(point.position, point.ns * sign, bumped * sign);
+    const auto found = levels_[size_t(level)].cache().find(point.position, point.ns * sign, bumped * sign);
     if (!found) return {};
     radiance += albedo * found->irradiance * kInvPi;
     if (point.path.depth == 0 && found->nearest < point.footprint) result.cache_record = 1.0f;
@@ -214,7 +213,7 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     const FilmSpec& spec = film.spec();
     if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
       path.seen_from_camera = false;
-    path.state.without = next->flags & kDiffuse ? no_caustics() : 0;
+    path.state.without = next->flags & kDiffuse ? s_.no_caustics : 0;
     path.origin = {light_query(point, bsdf), delta ? kInf : next->pdf_dir};
     if (!delta) least_pdf = std::min(least_pdf, next->pdf_dir);
     path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
@@ -231,12 +230,8 @@ std::string name_of_level(size_t level) { return "bounce " + std::to_string(leve
 
 Kept IrradianceCacheIntegrator::keep() const {
   Kept kept;
-  for (size_t level = 0; level < caches_.size(); ++level) {
-    const auto& records = caches_[level].records();
-    KeptTable& table = kept[name_of_level(level)];
-    table = {IrradianceRecord::kNumbers, std::vector<float>(records.size() * IrradianceRecord::kNumbers)};
-    for (size_t i = 0; i < records.size(); ++i) records[i].write(&table.numbers[i * IrradianceRecord::kNumbers]);
-  }
+  for (size_t level = 0; level < levels_.size(); ++level)
+    kept[name_of_level(level)] = {IrradianceLevel::kColumns, levels_[level].rows(passes_)};
   return kept;
 }
 
@@ -245,21 +240,15 @@ void IrradianceCacheIntegrator::take_over(const Kept& kept) {
   for (const auto& [name, table] : kept) {
     size_t level = 0;
     while (level < kMostLevels && name != name_of_level(level)) ++level;
-    require(level < kMostLevels && table.columns == IrradianceRecord::kNumbers, "'" + name + "' is no table of irradiance records");
-    for (size_t i = 0; i < table.rows(); ++i) {
-      const IrradianceRecord r = IrradianceRecord::read(&table.numbers[i * table.columns]);
-      bool good = r.radius > 0.0f && r.least >= 0.0f && r.reach > 0.0f && std::isfinite(r.radius) && is_finite(r.irradiance) &&
-                  std::isfinite(dot(r.position, r.position)) && std::abs(length_squared(r.normal) - 1.0f) < 1e-3f;
-      for (int axis = 0; axis < 3; ++axis) good = good && is_finite(r.translation[axis]) && is_finite(r.lateral[axis]);
-      require(good, "'" + name + "', row " + std::to_string(i) + ": no irradiance record");
-      taken_over_[level].push_back(r);
-    }
+    require(level < kMostLevels && table.columns == IrradianceLevel::kColumns, "'" + name + "' is no table of irradiance records");
+    IrradianceLevel::check(table.numbers, name);
+    taken_over_[level] = table.numbers;
   }
 }
 
 size_t IrradianceCacheIntegrator::record_count() const {
   size_t count = 0;
-  for (const IrradianceCache& cache : caches_) count += cache.records().size();
+  for (const IrradianceLevel& level : levels_) count += level.size();
   return count;
 }
 
@@ -276,33 +265,34 @@ void IrradianceCacheIntegrator::finish_pass(const RenderContext& context, int) {
 
 void IrradianceCacheIntegrator::play_overture(const RenderContext& context, Film& film) {
   for (int level = 0; level < std::max(level_count(), 1); ++level) {
-    caches_.emplace_back(context.scene.bounds(), error_at(level));
-    if (!taken_over_.empty())
-      for (const IrradianceRecord& record : taken_over_[size_t(level)]) caches_.back().insert(record);
+    levels_.emplace_back(context.scene.bounds(), error_at(level), s_.spacing);
+    if (!taken_over_.empty()) levels_.back().take_over(taken_over_[size_t(level)], context.steady);
   }
   taken_over_.clear();
   const size_t before = record_count();
-  gathered_ = uint32_t(before);
+  for (const IrradianceLevel& level : levels_) gathered_ += uint32_t(level.gathers());  // rays of their own for those to come
+  const uint32_t gathered_before = gathered_;
   if (before > 0) slack_ = kSlack;
   // Deepest first: records of a level are made with the help of those below.
   for (int level = level_count() - 1; level >= 0 && !context.cancelled; --level) {
     const double seconds = context.seconds(), left = std::max(kOvertureShare * context.time_limit - seconds, 0.0);
     level_ends_ = seconds + (level > 0 ? kDeeperShare : 1.0) * left;
     fill_level(context, film, level);
-    caches_[size_t(level)].freeze();
+    levels_[size_t(level)].freeze();
   }
   const size_t records = record_count();
   size_t bytes = 0;
-  for (const IrradianceCache& cache : caches_) bytes += cache.memory_bytes();
+  for (const IrradianceLevel& level : levels_) bytes += level.cache().memory_bytes();
   context.log.stage("");
-  context.log.say(std::to_string(records) + " records in the irradiance cache, " + std::to_string(caches_[0].records().size()) +
+  context.log.say(std::to_string(records) + " records in the irradiance cache, " + std::to_string(levels_[0].size()) +
                   " of the first bounce, " + (before ? std::to_string(before) + " taken over, " : "") + std::to_string(bytes >> 20) +
                   " MiB");
-  context.log.set("cache overture seconds", context.seconds());
+  overture_seconds_ = context.seconds();
+  context.log.set("cache overture seconds", overture_seconds_);
   context.log.set("cache records", double(records));
-  context.log.set("cache records of the first bounce", double(caches_[0].records().size()));
+  context.log.set("cache records of the first bounce", double(levels_[0].size()));
   context.log.set("cache records taken over", double(before));
-  context.log.set("cache records worked out", double(gathered_) - double(before));
+  context.log.set("cache records worked out", double(gathered_ - gathered_before));
   context.log.set("cache bytes", double(bytes));
 }
 
@@ -323,7 +313,7 @@ void IrradianceCacheIntegrator::fill_level(const RenderContext& context, const F
       return ka != kb ? ka < kb : std::tuple(a.y, a.x, a.eye) < std::tuple(b.y, b.x, b.eye);
     });
     constexpr int kBatch = 64;
-    std::vector<std::vector<Place>> found((pixels.size() + kBatch - 1) / kBatch);
+    std::vector<std::vector<IrradiancePlace>> found((pixels.size() + kBatch - 1) / kBatch);
     context.pool.for_each(int(found.size()), context.cancelled, [&](int batch) {
       const size_t end = std::min(pixels.size(), size_t(batch + 1) * kBatch);
       for (size_t i = size_t(batch) * kBatch; i < end && !is_late(context); ++i) {
@@ -331,7 +321,7 @@ void IrradianceCacheIntegrator::fill_level(const RenderContext& context, const F
         seek(context, film, p.eye < 0 ? context.camera : context.path[size_t(p.eye)], p.x, p.y, level, found[size_t(batch)]);
       }
     });
-    std::vector<Place> places;
+    std::vector<IrradiancePlace> places;
     for (const auto& batch : found) places.insert(places.end(), batch.begin(), batch.end());
     fill(context, film, std::move(places), level);
   }
@@ -339,7 +329,7 @@ void IrradianceCacheIntegrator::fill_level(const RenderContext& context, const F
 
 // Diffuse surfaces of a level along one path through a pixel that the cache does not cover.
 void IrradianceCacheIntegrator::seek(const RenderContext& context, const Film& film, const Camera& eye, int x, int y, int level,
-                                     std::vector<Place>& places) const {
+                                     std::vector<IrradiancePlace>& places) const {
   const FilmSpec& spec = film.spec();
   Sampler sampler(hash_combine(context.seed, kSeekSalt + uint32_t(level)), uint32_t(y) * uint32_t(spec.width) + uint32_t(x), 0);
   const Vec2 pixel{1.0f / float(spec.width), 1.0f / float(spec.height)};
@@ -358,9 +348,9 @@ void IrradianceCacheIntegrator::seek(const RenderContext& context, const Film& f
       for (const uint8_t side : {kReflection, kTransmission}) {
         if (is_black(bsdf.diffuse_albedo(point.wo, side))) continue;
         const float sign = side == kReflection ? 1.0f : -1.0f;
-        const float most = kCoarser * s_.max_spacing * 2.0f * point.footprint / error_at(level);
-        const Place place{point.position, point.ng * sign, point.ns * sign, point.footprint, camera.spread, level, most};
-        if (!caches_[size_t(level)].covers(place.position, place.normal, most, slack_)) places.push_back(place);
+        const float most = kCoarser * s_.spacing.max_pixels * 2.0f * point.footprint / error_at(level);
+        const IrradiancePlace place{point.position, point.ng * sign, point.ns * sign, point.footprint, camera.spread, most};
+        if (!levels_[size_t(level)].cache().covers(place.position, place.normal, most, slack_)) places.push_back(place);
       }
     }
     const float u_lobe = sampler.next_1d();
@@ -375,8 +365,9 @@ void IrradianceCacheIntegrator::seek(const RenderContext& context, const Film& f
 }
 
 // Wave by wave: look up together, work out together, insert one after the other.
-void IrradianceCacheIntegrator::fill(const RenderContext& context, const Film& film, std::vector<Place> places, int level) {
-  IrradianceCache& cache = caches_[size_t(level)];
+void IrradianceCacheIntegrator::fill(const RenderContext& context, const Film& film, std::vector<IrradiancePlace> places, int level) {
+  IrradianceLevel& records = levels_[size_t(level)];
+  const IrradianceCache& cache = records.cache();
   constexpr int kBatch = 1024;
   while (!context.cancelled) {
     std::vector<uint8_t> covered(places.size(), 0);
@@ -384,7 +375,7 @@ void IrradianceCacheIntegrator::fill(const RenderContext& context, const Film& f
       const size_t end = std::min(places.size(), size_t(batch + 1) * kBatch);
       for (size_t i = size_t(batch) * kBatch; i < end; ++i) covered[i] = cache.covers(places[i].position, places[i].normal, places[i].most);
     });
-    std::vector<Place> left;
+    std::vector<IrradiancePlace> left;
     for (size_t i = 0; i < places.size(); ++i)
       if (!covered[i]) left.push_back(places[i]);
     places = std::move(left);
@@ -392,54 +383,85 @@ void IrradianceCacheIntegrator::fill(const RenderContext& context, const Film& f
 
     context.log.stage("irradiance cache, bounce " + std::to_string(level + 1) + ", " + std::to_string(cache.records().size()) + " records");
     const size_t count = std::min(places.size(), std::max(kLeastWave, cache.records().size() / kWaveShare));
-    std::vector<std::optional<IrradianceRecord>> made(count);
+    std::vector<std::optional<GatheredIrradiance>> made(count);
     context.pool.for_each(int(count), context.cancelled, [&](int i) {
-      if (!is_late(context)) made[size_t(i)] = gather(context, film, places[size_t(i)], gathered_ + uint32_t(i));
+      if (!is_late(context)) made[size_t(i)] = gather(context, film, places[size_t(i)], level, gathered_ + uint32_t(i));
     });
     if (context.cancelled) return;  // those under way have lost rays
     gathered_ += uint32_t(count);
     for (size_t i = 0; i < count; ++i)
-      if (made[i] && !cache.covers(places[i].position, places[i].normal, places[i].most)) cache.insert(*made[i]);
+      if (made[i] && !cache.covers(places[i].position, places[i].normal, places[i].most)) records.insert(places[i], *made[i]);
     places.erase(places.begin(), places.begin() + std::ptrdiff_t(count));
   }
 }
 
-IrradianceRecord IrradianceCacheIntegrator::gather(const RenderContext& context, const Film& film, const Place& place,
-                                                   uint32_t serial) const {
-  const int samples = samples_at(place.level);
+// Rays that refining has still to spend before a pass. Where it is known how many passes there will be, those to come pay in advance: the
+// picture is the mean of what all passes see.
+double IrradianceCacheIntegrator::rays_to_refine(const RenderContext& context, int pass) const {
+  double passes = pass;
+  const double share = s_.refinement / std::max(1.0 - s_.refinement, 0.01);
+  if (context.passes > 0) passes = std::min<double>(kAhead * pass, context.passes);
+  if (context.time_limit > 0.0) {
+    const double seconds = context.seconds(), each = (seconds - overture_seconds_) / pass;
+    passes = std::min<double>(
+        passes, std::max<double>(pass, (context.time_limit - overture_seconds_) / std::max(each, 1e-6) * (1.0 - s_.refinement)));
+  }
+  return share * pass_rays_ / pass * passes - refining_rays_;
+}
+
+// More rays for the records, as many in all as the passes are worth: a record's value is the mean of its gathers, and the picture's the
+// mean over passes, so that blotches fade as noise does.
+void IrradianceCacheIntegrator::refine(const RenderContext& context, const Film& film, int pass) {
+  struct Chosen {
+    int level;
+    size_t record;
+  };
+  const uint64_t start = context.scene.rays_traced();
+  const double wanted = rays_to_refine(context, pass);
+  const size_t all = record_count();
+  const auto spent = [&] { return double(context.scene.rays_traced() - start); };
+  for (size_t idle = 0; idle < all && spent() < wanted;) {
+    std::vector<Chosen> chosen;
+    for (; chosen.size() < kRefined && idle < all; ++idle) {
+      // Deepest first, as in the overture.
+      size_t record = refined_++ % all;
+      int level = int(levels_.size()) - 1;
+      while (record >= levels_[size_t(level)].size()) record -= levels_[size_t(level--)].size();
+      if (!levels_[size_t(level)].is_fixed(record)) chosen.push_back({level, record});
+    }
+    if (chosen.empty()) return;
+    idle = 0;
+    std::vector<GatheredIrradiance> made(chosen.size());
+    context.pool.for_each(int(chosen.size()), context.cancelled, [&](int i) {
+      const Chosen& c = chosen[size_t(i)];
+      made[size_t(i)] = gather(context, film, levels_[size_t(c.level)].place(c.record), c.level, gathered_ + uint32_t(i));
+    });
+    if (context.cancelled) return;
+    gathered_ += uint32_t(chosen.size());
+    for (size_t i = 0; i < chosen.size(); ++i) levels_[size_t(chosen[i].level)].improve(chosen[i].record, made[i], pass);
+  }
+  refining_rays_ += spent();
+}
+
+GatheredIrradiance IrradianceCacheIntegrator::gather(const RenderContext& context, const Film& film, const IrradiancePlace& place,
+                                                     int level, uint32_t serial) const {
   const uint32_t seed = hash_combine(context.seed, kGatherSalt);
-  GatheredIrradiance g = gather_irradiance(
-      place.position, place.normal, samples, [&](int i) { return Sampler(seed, serial, uint32_t(i)).next_2d(); },
+  return gather_irradiance(
+      place.position, place.normal, samples_at(level), [&](int i) { return Sampler(seed, serial, uint32_t(i)).next_2d(); },
       [&](int i, Vec3 direction) -> GatheredRay {
         if (dot(direction, place.ng) <= 0.0f || context.cancelled) return {};
         const CameraRay from{{offset_point(place.position, place.ng, direction), direction}, place.spread, place.footprint};
         Walk walk{CameraPath(from), Rgb()};  // luminaires are sampled where the record is used
         PathState& state = walk.path.state;
-        state.depth = state.diffuse_depth = int16_t(place.level);
+        state.depth = state.diffuse_depth = int16_t(level);
         advance(state, kReflection | kDiffuse, s_.limits);
-        state.without = no_caustics();
+        state.without = s_.no_caustics;
         walk.path.seen_from_camera = false;
         Sampler sampler(seed, serial, uint32_t(i));
         PixelSample found;
         trace(context, film, from, walk, sampler, found);
         return {is_finite(found.radiance) ? found.radiance : Rgb(), walk.first_distance};
       });
-
-  // How far it holds: not beyond what it sees nearest, whatever the least spacing, nor beyond where its gradient ends.
-  IrradianceRecord& r = g.record;
-  const float error = error_at(place.level), pixel = 2.0f * place.footprint;
-  r.reach = std::max(g.nearest, kLeastReach * pixel);
-  float radius = r.radius;
-  const float slope = std::sqrt(sqr(luminance(r.translation[0])) + sqr(luminance(r.translation[1])) + sqr(luminance(r.translation[2])));
-  if (slope > 0.0f) radius = std::min(radius, luminance(r.irradiance) / slope);
-  const float least = std::max({s_.min_spacing * pixel, s_.min_length, 1e-6f}) / error;
-  const float most = std::min(s_.max_spacing * pixel, s_.max_length > 0.0f ? s_.max_length : kInf) / error;
-  r.least = least;
-  r.radius = std::max(least, std::min(radius, most));
-  // Where it has to hold for longer than its gradient does, that must not run away. [Ward & Heckbert 1992]
-  if (r.radius > radius)
-    for (Rgb& g_axis : r.translation) g_axis *= radius / r.radius;
-  return r;
 }
 
 }  // namespace
@@ -453,7 +475,10 @@ const Descriptor& irradiance_cache_descriptor() {
       "rough diffuse surfaces are read as if light came to them evenly",
       {
           {"error", "Error", Kind::kFloat, 0.25, 0.01, 1, "Allowed between records: the smaller, the more of them"},
-          {"record_samples", "Samples", Kind::kInt, 512, 16, 1 << 20, "Rays over the hemisphere of each record"},
+          {"record_samples", "Samples", Kind::kInt, 128, 16, 1 << 20,
+           "Rays over the hemisphere of each record, to begin with and each time that it is refined"},
+          {"refinement", "Refinement", Kind::kFloat, 0.5, 0, 0.95,
+           "Share of the passes' time in which records get more rays: blotches fade as noise does. 0 leaves them as they were first"},
           {"cached_bounces", "Cached Bounces", Kind::kInt, 4, 1, kMostLevels,
            "Diffuse bounces that have records; further ones are path traced"},
           {"min_spacing", "Minimum Spacing", Kind::kFloat, 3, 0, 1e4, "Pixels for which a record holds at least"},
@@ -476,7 +501,7 @@ const Descriptor& irradiance_cache_descriptor() {
       },
       [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<IrradianceCacheIntegrator>(p); },
       /*bakes=*/false,
-      /*kept_version=*/1,
+      /*kept_version=*/2,
       /*kept_by_place=*/true};
   return descriptor;
 }

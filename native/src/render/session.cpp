@@ -81,7 +81,9 @@ void Session::run() {
                                 lightmap_.get(),
                                 std::chrono::steady_clock::now(),
                                 settings_.time_limit,
-                                path_};
+                                settings_.samples,
+                                path_,
+                                steady_};
     const double start = now();
     integrator_->prepare(context);
     float noise = kInf;

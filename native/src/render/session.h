@@ -43,6 +43,7 @@ class Session {
   // Before start(): what a render by the same integrator kept; where the camera will be in other frames. Throws InputError.
   void take_over(const Kept& kept);
   void look_along(std::vector<Camera> path);
+  void stay_steady() { steady_ = true; }
   void start();
   bool wait(double seconds);  // true once it has ended
   void cancel();
@@ -59,6 +60,7 @@ class Session {
   const Scene& scene_;
   Camera camera_;
   std::vector<Camera> path_;
+  bool steady_ = false;
   Film film_;
   std::unique_ptr<const Lightmap> lightmap_;
   RenderSettings settings_;

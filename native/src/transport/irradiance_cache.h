@@ -51,6 +51,9 @@ class IrradianceCache {
   // Once nothing more is inserted: a copy in the order of the tree, which is faster to read.
   void freeze();
 
+  // Other light for a record that holds as far as before.
+  void set_light(size_t record, const IrradianceRecord& light) { records_[record] = light; }
+
   const std::vector<IrradianceRecord>& records() const { return records_; }
   float error() const { return error_; }
   size_t memory_bytes() const;

@@ -51,6 +51,7 @@ GatheredIrradiance gather_irradiance(Vec3 position, Vec3 normal, int samples, co
   record.position = position, record.normal = normal;
   record.irradiance = sum * (kPi / float(strata.count()));
   record.radius = inverse_distances > 0.0f ? float(strata.count()) / inverse_distances : kInf;
+  result.nearest *= strata.least_aim();
 
   const float wedge = 2.0f * kPi / float(sectors);
   for (int k = 0; k < sectors; ++k) {

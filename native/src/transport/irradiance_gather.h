@@ -18,12 +18,14 @@ struct HemisphereStrata {
   explicit HemisphereStrata(int samples)
       : rings(std::max(2, int(std::sqrt(float(samples) * kInvPi) + 0.5f))), sectors(std::max(4, int(kPi * float(rings) + 0.5f))) {}
   int count() const { return rings * sectors; }
+  // The least part of the distance along a ray that a wall may be away, of the rays towards it that meet it soonest.
+  float least_aim() const { return std::sqrt(1.0f - 1.0f / float(rings)) * std::max(std::cos(2.0f * kPi / float(sectors)), 0.5f); }
 };
 
 // What rays see from a place: irradiance, its gradients, and the harmonic mean and least of the distances.
 struct GatheredIrradiance {
   IrradianceRecord record;  // its radius is the harmonic mean
-  float nearest = kInf;
+  float nearest = kInf;  // metres; no wall is nearer
 };
 
 // `ray(index, direction)`: about `samples` of them, one for each stratum; `jitter(index)` places it therein.

@@ -74,7 +74,10 @@ struct RenderContext {
   const Lightmap* lightmap = nullptr;  // in a bake: takes the camera's place
   std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
   double time_limit = 0;               // seconds from `start`; 0: none
+  int passes = 0;                      // that are wanted; 0: as many as there is time for
   std::span<const Camera> path = {};   // where the camera will be in other frames, which what is kept may serve as well
+
+  bool steady = false;                 // a frame among others: what it takes over stays as it is
 
   double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); }
 };

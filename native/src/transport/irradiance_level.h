@@ -1,0 +1,62 @@
+// The irradiance records of one bounce as they come about: where each was gathered, how far it holds, how it gets better as more rays are
+// gathered there, and as rows of a table that outlasts the render. Leaves out how places are found and rays followed.
+#pragma once
+#include <string>
+
+#include "transport/irradiance_gather.h"
+
+namespace gi {
+
+// Where a path came upon a diffuse surface: where a record may be wanted.
+struct IrradiancePlace {
+  Vec3 position, ng, normal;
+  float footprint = 0, spread = 0;  // of the pixel, as it is seen from here on
+  float most = kInf;                // a radius beyond which a record of another picture is too coarse here
+};
+
+// How far records hold at least and at most.
+struct IrradianceSpacing {
+  float min_pixels, max_pixels;
+  float min_length, max_length;  // metres; 0: none
+};
+
+class IrradianceLevel {
+ public:
+  static constexpr size_t kColumns = IrradianceRecord::kNumbers + 6;
+
+  IrradianceLevel(Bounds bounds, float error, IrradianceSpacing spacing) : cache_(bounds, error), spacing_(spacing) {}
+
+  const IrradianceCache& cache() const { return cache_; }
+  size_t size() const { return cache_.records().size(); }
+  const IrradiancePlace& place(size_t record) const { return growth_[record].place; }
+  double gathers() const;  // of all records
+  bool is_fixed(size_t record) const { return growth_[record].fixed; }
+
+  void insert(const IrradiancePlace& place, const GatheredIrradiance& gathered);
+  // As many rays once more for one record, before pass `pass`.
+  void improve(size_t record, const GatheredIrradiance& gathered, int pass);
+  void freeze() { cache_.freeze(); }
+
+  // Rows of kColumns numbers: records as `passes` passes have seen them on average.
+  std::vector<float> rows(int passes) const;
+  // Throws InputError naming the row that is none. `fixed`: nothing is to improve them.
+  void take_over(const std::vector<float>& rows, bool fixed);
+  static void check(const std::vector<float>& rows, const std::string& name);
+
+ private:
+  // What irradiance a record says is the mean of all gathers; what passes saw of it, the mean over passes.
+  struct Growth {
+    IrradiancePlace place;
+    float gathers = 1;
+    bool fixed = false;
+    int changed = 0;            // pass that was the first to see it as it is
+    IrradianceRecord seen = {};  // sum over the passes before that
+  };
+  IrradianceRecord settled(const IrradiancePlace& place, const GatheredIrradiance& gathered) const;
+
+  IrradianceCache cache_;
+  IrradianceSpacing spacing_;
+  std::vector<Growth> growth_;
+};
+
+}  // namespace gi
