@@ -8,16 +8,20 @@
 namespace gi {
 namespace {
 
-constexpr uint32_t kParticleStream = 0x70617274u, kAimStream = 0x61696d65u;
+constexpr uint32_t kParticleStream = 0x70617274u, kAimStream = 0x61696d65u, kWayStream = 0x77617973u;
 constexpr int kRoundsOfAPass = 8;      // a round, to learn where to aim, has this part of a pass's particles
 constexpr int kLeastRound = 1 << 12;   // but no fewer than these
 constexpr int kLeastRounds = 3, kMostRounds = 24;
 constexpr size_t kMostTrials = 1 << 19;  // that a guide is made of, about
 constexpr size_t kWellAimed = 20000;      // trials that brought something end the learning before the first pass
-constexpr int kMostLookers = 1 << 14;  // paths from the eye that show what is seen
+constexpr size_t kEnoughOnTheWay = 5000;
+constexpr size_t kLost = 32;  // with fewer in the first round, the way to what is seen is looked for first
+constexpr int kMostLookers = 1 << 14;     // paths from the eye that show what is seen
 constexpr uint8_t kAllLobes = kDiffuse | kGlossy | kSpecular | kTransparent;
 constexpr uint32_t kMostLayers = 64;  // that light without shadows passes
 constexpr int kBatch = 1024;  // particles that a thread takes at a time
+
+using Trials = std::vector<EmissionGuide::Trial>;
 
 enum class DirectLight { kRays, kTexels };
 
@@ -28,7 +32,7 @@ struct ParticleSettings {
   DirectLight direct;
   bool gather, aim;
   BounceLimits limits;
-  bool reflective_caustics, refractive_caustics;
+  uint8_t without;  // CausticFlags
 };
 
 // Where the power of one pass went, watts, channels added up. At every surface a particle goes on with the probability that keeps
@@ -79,8 +83,7 @@ class ParticleIntegrator final : public Integrator {
            p.on("aim"),
            {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
             p.integer("transparent_bounces")},
-           p.on("caustics_reflective"),
-           p.on("caustics_refractive")} {}
+           no_caustics(p)} {}
 
   void prepare(const RenderContext& context) override {
     texels_ = std::make_unique<Texels>(context.scene, s_.texel_size, s_.texel_memory, context.pool, context.cancelled);
@@ -108,17 +111,19 @@ class ParticleIntegrator final : public Integrator {
     uint32_t stream, first;
     int count;
   };
-  void trace_particles(const RenderContext& context, const Batch& all, Ledger* ledger, std::vector<EmissionGuide::Trial>* trials);
+  void trace_particles(const RenderContext& context, const Batch& all, Ledger* ledger, Trials* trials);
   EmissionGuide::Trial trace_particle(const RenderContext& context, Sampler sampler, float share, Ledger& ledger);
   double carry(const RenderContext& context, const EmittedRay& emitted, Particle p, Ledger& ledger);
   void log_ledger(Log& log, int passes) const;
   void aim(const RenderContext& context, const Film& film);
-  void learn(std::vector<EmissionGuide::Trial> trials) {
+  void find_the_way(const RenderContext& context, const Film& film, int count);
+  void learn(Trials trials) {
     learned_from_ = std::max(trials.size(), size_t(1));
     guide_ = EmissionGuide(std::move(trials));
   }
-  void look_around(const RenderContext& context, const Film& film, int round) const;
-  void look(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler, PixelSample& result) const;
+  void look_around(const RenderContext& context, const Film& film, int round, std::vector<Vec3>* seen) const;
+  void look(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler, PixelSample& result,
+            std::vector<Vec3>* seen = nullptr) const;
   Rgb read(const ShadingPoint& point, const Bsdf& bsdf) const;
 
   // A bake of indirect light alone must be able to tell it apart.
@@ -127,28 +132,25 @@ class ParticleIntegrator final : public Integrator {
   }
   bool is_caustic(uint8_t last) const {
     if (!(last & (kGlossy | kSpecular))) return false;
-    return last & kTransmission ? !s_.refractive_caustics : !s_.reflective_caustics;
-  }
-
-  uint8_t no_caustics() const {
-    return uint8_t((s_.reflective_caustics ? 0 : kNoReflectiveCaustics) | (s_.refractive_caustics ? 0 : kNoRefractiveCaustics));
+    return s_.without & (last & kTransmission ? kNoRefractiveCaustics : kNoReflectiveCaustics);
   }
 
   ParticleSettings s_;
   std::unique_ptr<Texels> texels_;
   EmissionGuide guide_;
+  SeenPoints seen_;
+  bool finding_the_way_ = false;  // to these
   size_t learned_from_ = 0;                     // trials; 0: no longer learns
-  std::vector<EmissionGuide::Trial> trials_;  // of passes since then
+  Trials trials_;  // of passes since then
   Ledger ledger_;
 };
 
 // ---------------------------------------------------------------- from the light
 
-void ParticleIntegrator::trace_particles(const RenderContext& context, const Batch& all, Ledger* ledger,
-                                         std::vector<EmissionGuide::Trial>* trials) {
+void ParticleIntegrator::trace_particles(const RenderContext& context, const Batch& all, Ledger* ledger, Trials* trials) {
   const int batches = (all.count + kBatch - 1) / kBatch;
   std::vector<Ledger> ledgers{size_t(batches)};
-  std::vector<std::vector<EmissionGuide::Trial>> found{size_t(batches)};
+  std::vector<Trials> found{size_t(batches)};
   context.pool.for_each(batches, context.cancelled, [&](int b) {
     for (int k = b * kBatch; k < std::min((b + 1) * kBatch, all.count); ++k) {
       const Sampler sampler(context.seed, all.stream, all.first + uint32_t(k));
@@ -235,8 +237,10 @@ double ParticleIntegrator::carry(const RenderContext& context, const EmittedRay&
 
     // Leave the power, whether the particle goes on or not.
     const bool is_lit = !is_direct || context.lights.turns_to(emitted, point.position);
-    if ((bsdf.flags() & kDiffuse) && is_lit && p.bounces.reaches_diffuse(s_.limits) && (!is_direct || direct_in_texels(context)))
+    if ((bsdf.flags() & kDiffuse) && is_lit && p.bounces.reaches_diffuse(s_.limits) && (!is_direct || direct_in_texels(context))) {
       worth += texels_->deposit(point, point.backfacing, p.power * diffuse_share(point, bsdf));
+      if (finding_the_way_) worth += double(average(p.power) * seen_.density(point.position));
+    }
 
     // Go on with the probability of what is left, absorbed otherwise.
     const float u_lobe = p.sampler.next_1d(), u_absorb = p.sampler.next_1d();
@@ -264,24 +268,37 @@ double ParticleIntegrator::carry(const RenderContext& context, const EmittedRay&
 
 // ---------------------------------------------------------------- where to aim
 
+// The younger half of rounds: the older ones did not know yet what is bright.
+Trials younger(const std::vector<Trials>& rounds) {
+  Trials trials;
+  for (size_t r = rounds.size() / 2; r < rounds.size(); ++r) trials.insert(trials.end(), rounds[r].begin(), rounds[r].end());
+  return trials;
+}
+
 // Most particles may come to nothing that is seen: those of a sky to all but a room's windows, those of a lamp to all but the room it
 // hangs in. Rounds of particles, thrown away, show which do not; those of passes that follow refine it for passes still to come.
 void ParticleIntegrator::aim(const RenderContext& context, const Film& film) {
   texels_->clear(context.lights.emitted_power());
   texels_->watch();
-  std::vector<std::vector<EmissionGuide::Trial>> rounds;
-  while (int(rounds.size()) < kMostRounds) {
+  std::vector<Trials> rounds;
+  int count = std::max(s_.particles / kRoundsOfAPass, kLeastRound);
+  uint32_t first = 0;
+  bool lost = false;
+  while (int(rounds.size()) < (lost ? kRoundsOfAPass : kMostRounds)) {
     const int round = int(rounds.size());
     context.log.stage("aiming particles, round " + std::to_string(round + 1));
-    if (round < kRoundsOfAPass) look_around(context, film, round);
+    if (round < kRoundsOfAPass) look_around(context, film, round, nullptr);
     texels_->appraise();
-    const int count = std::max(s_.particles / kRoundsOfAPass, kLeastRound);
-    trace_particles(context, {kAimStream, uint32_t(round) * uint32_t(count), count}, nullptr, &rounds.emplace_back());
+    trace_particles(context, {kAimStream, first, count}, nullptr, &rounds.emplace_back());
+    first += uint32_t(count);
     if (context.cancelled) break;
-    // The younger half: the older ones did not know yet what is bright.
-    std::vector<EmissionGuide::Trial> trials;
-    for (size_t r = rounds.size() / 2; r < rounds.size(); ++r) trials.insert(trials.end(), rounds[r].begin(), rounds[r].end());
-    learn(std::move(trials));
+    if (round == 0 && rounds[0].size() < kLost) {
+      lost = true, count = std::max(s_.particles, kLeastRound);
+      find_the_way(context, film, count);
+      continue;
+    }
+    // What was learned on the way is better than what a few trials tell.
+    if (Trials trials = younger(rounds); !lost || trials.size() > kEnoughOnTheWay) learn(std::move(trials));
     if (learned_from_ > kWellAimed && round + 1 >= kLeastRounds) break;
   }
   texels_->stop_watching();
@@ -289,10 +306,30 @@ void ParticleIntegrator::aim(const RenderContext& context, const Film& film) {
   context.log.stage("");
 }
 
-// Rows of pixels all over the picture.
-void ParticleIntegrator::look_around(const RenderContext& context, const Film& film, int round) const {
+// Where next to no particle comes to what is read, rounds before those count any that comes near what is seen. They are large: most of
+// their particles are lost at once and cost little.
+void ParticleIntegrator::find_the_way(const RenderContext& context, const Film& film, int count) {
+  std::vector<Vec3> points;
+  look_around(context, film, 0, &points);
+  seen_ = SeenPoints(points, context.pool);
+  finding_the_way_ = true;
+  std::vector<Trials> rounds;
+  while (int(rounds.size()) < kMostRounds && learned_from_ <= kWellAimed && !context.cancelled) {
+    const uint32_t round = uint32_t(rounds.size());
+    context.log.stage("aiming particles, finding the way, round " + std::to_string(round + 1));
+    trace_particles(context, {kWayStream, round * uint32_t(count), count}, nullptr, &rounds.emplace_back());
+    learn(younger(rounds));
+    if (round >= 4 && 4 * rounds.back().size() < 5 * rounds[round / 2].size()) break;  // it grows no more
+  }
+  finding_the_way_ = false;
+  context.log.set("rounds of finding the way", double(rounds.size()));
+}
+
+// Rows of pixels all over the picture. Adds what is seen there to `seen`.
+void ParticleIntegrator::look_around(const RenderContext& context, const Film& film, int round, std::vector<Vec3>* seen) const {
   const FilmSpec& spec = film.spec();
   const int rows = int(film.tiles().size()) * Film::kTileSize, step = std::max(1, rows * Film::kTileSize / kMostLookers);
+  std::vector<std::vector<Vec3>> found{size_t(rows / step)};
   context.pool.for_each(rows / step, context.cancelled, [&](int k) {
     const int row = k * step + int(hash32(uint32_t(round)) % uint32_t(step));
     const Tile& tile = film.tiles()[size_t(row / Film::kTileSize)];
@@ -303,9 +340,11 @@ void ParticleIntegrator::look_around(const RenderContext& context, const Film& f
       if (context.lightmap && !context.lightmap->covers(spec.x0 + tile.x0 + i, spec.y0 + y)) continue;
       Sampler sampler = cameras.samplers.sampler(i);
       PixelSample unused;
-      look(context, film, cameras.rays[i], sampler, unused);
+      look(context, film, cameras.rays[i], sampler, unused, seen ? &found[size_t(k)] : nullptr);
     }
   });
+  if (!seen) return;
+  for (const auto& part : found) seen->insert(seen->end(), part.begin(), part.end());
 }
 
 // ---------------------------------------------------------------- from the eye
@@ -321,13 +360,16 @@ Rgb ParticleIntegrator::read(const ShadingPoint& point, const Bsdf& bsdf) const 
 }
 
 void ParticleIntegrator::look(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler,
-                              PixelSample& result) const {
+                              PixelSample& result, std::vector<Vec3>* seen) const {
   DiffuseEndSettings end;
-  end.limits = s_.limits, end.without = no_caustics(), end.gathers = s_.gather;
+  end.limits = s_.limits, end.without = s_.without, end.gathers = s_.gather;
   end.direct_known = end.direct_gathered = direct_in_texels(context);
   trace_to_diffuse(
       context, film, end, camera, sampler, result, [](const ShadingPoint&, const Bsdf&) { return Rgb(); },
-      [&](const ShadingPoint& point, const Bsdf& bsdf, bool) { return KnownLight{Rgb(), read(point, bsdf)}; });
+      [&](const ShadingPoint& point, const Bsdf& bsdf, bool) {
+        if (seen) seen->push_back(point.position);
+        return KnownLight{Rgb(), read(point, bsdf)};
+      });
 }
 
 }  // namespace

@@ -118,13 +118,13 @@ SeenPoints::SeenPoints(const std::vector<Vec3>& points, ThreadPool& pool) : tree
   }
 }
 
-bool SeenPoints::near(Vec3 position) const {
+float SeenPoints::density(Vec3 position) const {
   float best = kInf;
   uint32_t nearest = 0;
   tree_.within(position, best, [&](uint32_t k, float d2) {
     if (d2 < best) best = d2, nearest = k;
   });
-  return best < kInf && best <= reach_[nearest];
+  return best < kInf && best <= reach_[nearest] && reach_[nearest] > 0.0f ? 1.0f / reach_[nearest] : 0.0f;
 }
 
 }  // namespace gi

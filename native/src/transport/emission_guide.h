@@ -43,7 +43,8 @@ class SeenPoints {
  public:
   SeenPoints() = default;
   SeenPoints(const std::vector<Vec3>& points, ThreadPool& pool);
-  bool near(Vec3 position) const;
+  bool near(Vec3 position) const { return density(position) > 0.0f; }
+  float density(Vec3 position) const;  // 1/m², of points, but for a factor; 0 where none is near
 
  private:
   PointTree tree_;
