@@ -37,7 +37,7 @@ def parser(commands_by_name: dict, in_blender: bool) -> argparse.ArgumentParser:
         "--strategies",
         type=Path,
         metavar="DIR",
-        help="instead of the picture: every strategy of a bidirectional integrator, weighted and not, into this folder",
+        help="instead of the picture: every strategy of a bidirectional integrator, weighted and not, for paths of up to 8 vertices, into this folder",
     )
     render.add_argument("--resolution", type=resolution, metavar="WxH", help="pixels")
     which = render.add_mutually_exclusive_group()
