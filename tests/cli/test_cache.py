@@ -118,7 +118,7 @@ def test_a_file_of_another_scene(gi, room, tmp_path):
     def err(*words, file=file):
         return gi("render", file, "-o", out, "--cache", cache, *HERE, *words).err
 
-    assert "does not fit the scene: setting error has changed from 0.25 to 0.5;" in err("--set", "error=0.5")
+    assert "does not fit the scene: setting error has changed from 0.15 to 0.5;" in err("--set", "error=0.5")
     assert err("--set", "max_spacing=30", "--samples", 2, "--seed", 4) == ""
     assert 'does not fit the scene: lamp "lamp" has changed;' in err(file=dimmed)
     assert err(file=changed) == ""  # what lies near is dropped, and the rest serves on

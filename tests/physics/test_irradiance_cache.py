@@ -239,7 +239,7 @@ def test_no_light_comes_through_a_thin_wall():
 def test_cache_samples_show_where_records_lie():
     scene = SCENES["area lamp"]()
     scene.camera = camera()
-    (_, records), figures = render(scene, pixels=64, passes=("Combined", "Cache Samples"))
+    (_, records), figures = render(scene, pixels=64, passes=("Combined", "Cache Samples"), error=0.25, min_spacing=3)
     assert figures["cache hit rate"] > 0.98
     assert 50 < figures["cache records of the first bounce"] <= figures["cache records"]
     assert 0.2 * figures["cache records of the first bounce"] < (records > 0).sum() < 0.4 * records.size

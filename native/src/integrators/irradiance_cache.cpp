@@ -474,14 +474,14 @@ const Descriptor& irradiance_cache_descriptor() {
       "Light between diffuse surfaces is worked out at few places and interpolated: smooth interiors soon. Biased by the error allowed; "
       "rough diffuse surfaces are read as if light came to them evenly",
       {
-          {"error", "Error", Kind::kFloat, 0.25, 0.01, 1, "Allowed between records: the smaller, the more of them"},
+          {"error", "Error", Kind::kFloat, 0.15, 0.01, 1, "Allowed between records: the smaller, the more of them"},
           {"record_samples", "Samples", Kind::kInt, 128, 16, 1 << 20,
            "Rays over the hemisphere of each record, to begin with and each time that it is refined"},
-          {"refinement", "Refinement", Kind::kFloat, 0.5, 0, 0.95,
+          {"refinement", "Refinement", Kind::kFloat, 0.25, 0, 0.95,
            "Share of the passes' time in which records get more rays: blotches fade as noise does. 0 leaves them as they were first"},
           {"cached_bounces", "Cached Bounces", Kind::kInt, 4, 1, kMostLevels,
            "Diffuse bounces that have records; further ones are path traced"},
-          {"min_spacing", "Minimum Spacing", Kind::kFloat, 3, 0, 1e4, "Pixels for which a record holds at least"},
+          {"min_spacing", "Minimum Spacing", Kind::kFloat, 1.5, 0, 1e4, "Pixels for which a record holds at least"},
           {"max_spacing", "Maximum Spacing", Kind::kFloat, 40, 1, 1e6, "Pixels for which a record holds at most"},
           {"min_length", "Minimum Distance", Kind::kFloat, 0, 0, 1e6, "The same as a length", "LENGTH"},
           {"max_length", "Maximum Distance", Kind::kFloat, 0, 0, 1e6, "The same as a length; 0 is off", "LENGTH"},
