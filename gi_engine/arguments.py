@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 from pathlib import Path
 
 from . import native
+from .compare import arguments as compare_arguments
 from .scene_data import LIGHTMAP_CONTENTS
 
 EPILOG = "exit codes: 0 done; 1 the render failed; 2 bad arguments; 130 cancelled, with what was finished written"
@@ -93,7 +95,8 @@ def parser(commands_by_name: dict, in_blender: bool) -> argparse.ArgumentParser:
 
     integrators = commands.add_parser("integrators", help="list the integrators and their parameters")
     integrators.set_defaults(command=commands_by_name["integrators"])
-    for command in (render, bake, info, integrators):
+    others = compare_arguments.add_commands(commands, commands_by_name, file, sys.modules[__name__])
+    for command in (render, bake, info, integrators, *others):
         command.add_argument("-v", "--verbose", action="store_true", help="show what Blender prints")
     return program
 

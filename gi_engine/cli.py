@@ -314,7 +314,19 @@ def range_of(parameter: dict) -> str:
     return f"{kind}, {parameter.get('min'):g} to {parameter.get('max'):g} {parameter.get('unit', '')}".strip()
 
 
-COMMANDS = {"render": render_command, "bake": bake_command, "info": info_command, "integrators": integrators_command}
+def compare_command(arguments, out, err) -> int:
+    from .compare.commands import compare_command
+
+    return compare_command(arguments, out, err)
+
+
+COMMANDS = {
+    "render": render_command,
+    "bake": bake_command,
+    "info": info_command,
+    "integrators": integrators_command,
+    "compare": compare_command,
+}
 
 
 # What commands share

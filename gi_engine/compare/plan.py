@@ -1,0 +1,106 @@
+"""What is to be compared: the engines, how long each renders, against what. No bpy, nothing is rendered here."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import native
+
+CYCLES = "cycles"
+DEFAULT_SECONDS = 10.0
+# The last picture of each engine is rendered twice, by two seeds: what the two have in common is no noise.
+STEP = 4  # times as long as the one before
+FIRST_SECONDS = 1.0  # of a run until an error is reached
+
+
+class PlanError(ValueError):
+    """The comparison cannot begin; the message names why."""
+
+
+@dataclass
+class Plan:
+    file: Path
+    engines: list[str]  # "cycles" or an integrator's id
+    output: Path
+    reference: str | Path = CYCLES  # an engine, or an EXR file
+    seconds: float = 0.0  # one of these three is above 0
+    samples: int = 0
+    until: float = 0.0  # relative mean squared error
+    reference_seconds: float = 0.0  # 0: as many times an engine's as REFERENCE_TIMES
+    reference_samples: int = 0
+    steps: int = 3
+    frame: int | None = None
+    resolution: tuple[int, int] | None = None
+    region: tuple[float, float, float, float] | None = None  # left, bottom, right, top: shares of the picture
+    threads: int = 0  # 0: the scene's
+    limit: float = 600.0  # seconds that one render may take beyond what was asked for
+    cache: Path | None = None
+    neutral: bool = False  # takes away filters and cut-offs that bias, so that blocks can be tested
+
+    def view(self) -> dict:
+        """What the picture depends on beside the file and the engine."""
+        return {
+            "frame": self.frame,
+            "resolution": self.resolution,
+            "region": self.region,
+            "neutral": self.neutral,
+            "threads": self.threads,
+        }
+
+
+def engine_label(engine: str) -> str:
+    if engine == CYCLES:
+        return "Cycles"
+    return next((d["label"] for d in native.integrators() if d["id"] == engine), engine)
+
+
+def find_engine(word: str) -> str:
+    """The engine that `word` names, whole or by its beginning. Raises PlanError with what there is."""
+    names = [CYCLES, *(d["id"] for d in native.integrators())]
+    if word in names:
+        return word
+    found = [name for name in names if word and name.startswith(word)]
+    if len(found) != 1:
+        raise PlanError(f'no engine "{word}"; there are: {", ".join(names)}')
+    return found[0]
+
+
+def find_engines(text: str) -> list[str]:
+    return list(dict.fromkeys(find_engine(word.strip()) for word in text.split(",")))
+
+
+def find_reference(text: str) -> str | Path:
+    if text.lower().endswith(".exr"):
+        if not Path(text).is_file():
+            raise PlanError(f'reference "{text}" is not there')
+        return Path(text)
+    return find_engine(text)
+
+
+def cache_folder() -> Path:
+    """Where references are kept, by the habits of the system."""
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home())
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "gi-engine" / "references"
+
+
+def content_key(plan: Plan, engine: str, facts: dict) -> str:
+    """A digest of all that the reference depends on: the .blend, the files it reads (by size and time), the view, the program."""
+    digest = hashlib.sha256(plan.file.read_bytes())
+    for name in sorted(facts["reads"]):
+        path = Path(name)
+        stat = path.stat() if path.is_file() else None
+        digest.update(f"{name} {stat.st_size if stat else ''} {stat.st_mtime_ns if stat else ''}".encode())
+    view = {name: value for name, value in plan.view().items() if name != "threads"}
+    digest.update(f"{engine} {facts['blender']} {facts['size']} {facts['frame']} {view}".encode())
+    if engine != CYCLES:
+        digest.update(Path(native.module()._core.__file__).read_bytes())
+    return digest.hexdigest()[:24]
