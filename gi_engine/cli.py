@@ -320,12 +320,19 @@ def compare_command(arguments, out, err) -> int:
     return compare_command(arguments, out, err)
 
 
+def series_command(arguments, out, err) -> int:
+    from .compare.commands import series_command
+
+    return series_command(arguments, out, err)
+
+
 COMMANDS = {
     "render": render_command,
     "bake": bake_command,
     "info": info_command,
     "integrators": integrators_command,
     "compare": compare_command,
+    "series": series_command,
 }
 
 

@@ -37,7 +37,15 @@ def add_commands(commands, commands_by_name: dict, file: dict, types) -> list:
     )
     compare.add_argument("--machine-progress", action="store_true", help=argparse.SUPPRESS)
     compare.set_defaults(command=commands_by_name["compare"])
-    return [compare]
+    series = commands.add_parser(
+        "series", help="the classic figure: from ray tracing to global illumination, on one sheet"
+    )
+    series.add_argument("file", **file)
+    add_limits(series, types)
+    series.add_argument("--frame", type=int, metavar="N", help="default: the scene's current frame")
+    series.add_argument("-o", "--output", type=Path, default=Path("series"), metavar="DIR", help="default: %(default)s")
+    series.set_defaults(command=commands_by_name["series"])
+    return [compare, series]
 
 
 def add_limits(command, types) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from ..display import display_on
 from ..output import OutputError
 from . import plan as plans
 from . import report, runner
+from .child import Cancelled
 
 DONE, FAILED, CANCELLED = 0, 1, 130
 
@@ -39,6 +41,29 @@ def outcome(result: runner.Comparison, page: Path, display, streams) -> int:
     for rendered in failed:
         display.say(f"gi-engine: {rendered.label}: {rendered.error}", err)
     return FAILED if failed or result.reference is None else DONE
+
+
+def series_command(arguments, out, err) -> int:
+    from ..cli import controlled, interruptible
+
+    missing = [name for name in ("OpenEXR", "PIL") if importlib.util.find_spec(name) is None]
+    if missing:
+        raise ArgumentError(f"series needs the Python packages OpenEXR and pillow; not there: {', '.join(missing)}")
+    from .series import SHEET, series, steps
+
+    native.module()
+    engines = list(dict.fromkeys(step.engine for step in steps()))
+    file = scene_file(arguments)
+    plan = plans.Plan(file, engines, made(arguments.output), frame=arguments.frame, **limits_of(arguments))
+    wishes = Control()
+    with controlled(wishes, err), interruptible(wishes), display_on(err) as display:
+        try:
+            finished = series(plan, Teller(display, err))
+        except Cancelled:
+            display.say("gi-engine: cancelled; what was finished is there", err)
+            return CANCELLED
+        display.say(f"{plan.output / SHEET}", out)
+    return FAILED if any(step.error for step in finished) else DONE
 
 
 class Teller(runner.Watcher):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+CHANNELS = "RGBXYZWUVA"  # a file has them by the alphabet
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
@@ -37,15 +38,15 @@ def read_exr(path: Path) -> np.ndarray:
 
 
 def read_passes(path: Path) -> dict[str, np.ndarray]:
-    """Pass → (height, width, channels) float32, of the first view layer. Raises PictureError."""
-    groups: dict[tuple[str, str], list] = {}
+    """Pass → (height, width, channels) float32, of the first view layer, channels as in CHANNELS. Raises PictureError."""
+    groups: dict[tuple[str, str], dict] = {}
     for name, pixels in planes_of(path).items():
         found = re.fullmatch(r"(?:(.*)\.)?([^.]+)\.(\w)", name)
         if found:
-            groups.setdefault((found[1] or "", found[2]), []).append(pixels)
+            groups.setdefault((found[1] or "", found[2]), {})[found[3]] = pixels
     layers = list(dict.fromkeys(layer for layer, _ in groups))
     return {
-        name: np.stack(planes, -1)
+        name: np.stack([planes[c] for c in sorted(planes, key=CHANNELS.find)], -1)
         for (layer, name), planes in groups.items()
         if layer == layers[0] and name != "Combined"
     }
