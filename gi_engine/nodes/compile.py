@@ -6,6 +6,7 @@ Anything that cannot be rendered gets a stated fallback and one warning that nam
 from __future__ import annotations
 
 import importlib
+import re
 import sys
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,6 +23,14 @@ for _family in ("values", "math", "color", "vector", "input", "textures", "closu
 KIND_OF_SOCKET = {"VALUE": FLOAT, "INT": FLOAT, "BOOLEAN": FLOAT, "VECTOR": VECTOR, "ROTATION": VECTOR, "RGBA": COLOR}
 DEFAULT_GREY = 0.8  # of objects without a material
 MULTI_GGX = 3  # as in rules_closures
+# What Cycles leaves out of the trees that it makes.
+NOT_FOR_CYCLES = {
+    "ShaderNodeShaderToRGB": "is for EEVEE alone",
+    "ShaderNodeUVAlongStroke": "is for Freestyle alone",
+    "ShaderNodeSqueeze": "is from before Blender 2.8",
+    "ShaderNodeScript": "needs Open Shading Language",
+}
+NUMBERED = re.compile(r"^\d+_")
 DEEPEST = 20000  # Python's recursion limit while a tree is compiled: some frames for each node of a chain
 
 
@@ -84,9 +93,15 @@ class Compiler:
         return owner.evaluated_get(self.depsgraph).matrix_world
 
     def view_layer_attribute(self, name: str) -> tuple:
-        """A property of the view layer or the scene as four numbers; zeros where there is none."""
-        owners = (self.depsgraph.view_layer_eval, self.depsgraph.scene_eval)
-        return look_up(owners, name) or (0.0, 0.0, 0.0, 1.0)
+        """A property of the view layer, the scene or the world as four numbers; zeros where there is none."""
+        scene = self.depsgraph.scene_eval
+        return look_up((self.depsgraph.view_layer_eval, scene, scene.world), name) or (0.0, 0.0, 0.0, 0.0)
+
+    def scene_time(self) -> tuple[float, float]:
+        """Seconds and frames."""
+        scene = self.depsgraph.scene_eval
+        frame = scene.frame_current + scene.frame_subframe
+        return frame * scene.render.fps_base / scene.render.fps, frame
 
     # ---------------------------------------------------------------- entry points
 
@@ -97,7 +112,7 @@ class Compiler:
             return self._plain(material.name, tuple(material.diffuse_color[:3]))
         walker = TreeWalker(self, f"material '{material.name}'", material)
         with deep_recursion():
-            walker.surface(material)
+            walker.surface(material, walker.tree)
         program = walker.builder.finish(material.name)
         program.pass_index = material.pass_index
         settings = getattr(material, "cycles", None)
@@ -119,11 +134,11 @@ class Compiler:
 
     def _emitter(self, owner, what: str) -> Program:
         walker = TreeWalker(self, f"{what} '{owner.name}'", owner)
-        output = owner.node_tree.get_output_node("CYCLES")
+        output = walker.tree.get_output_node("CYCLES")
         if output is not None:
-            walker.warn_of_volume(Context(owner.node_tree), output)
+            walker.warn_of_volume(Context(walker.tree), output)
             with deep_recursion():
-                walker.closure_input(Context(owner.node_tree), output.inputs["Surface"], walker.builder.constant(1.0))
+                walker.closure_input(Context(walker.tree), output.inputs["Surface"], walker.builder.constant(1.0))
         return walker.builder.finish(owner.name)
 
     def _default_material(self) -> Program:
@@ -150,30 +165,36 @@ class TreeWalker:
         self.compiler = compiler
         self.who = who
         self.owner = owner
+        self.inlined = inlined(owner)  # held, or its tree would go
+        self.tree = self.inlined.node_tree if self.inlined else owner.node_tree
         self.builder = ProgramBuilder()
         self.outputs: list[dict] = [{}]  # outputs of nodes by (context, node), innermost scope last
         self.active: list[tuple] = []  # nodes being compiled, to find cycles
 
-    def surface(self, material) -> None:
-        context = Context(material.node_tree)
-        output = material.node_tree.get_output_node("CYCLES")
+    def surface(self, material, tree) -> None:
+        context = Context(tree)
+        output = tree.get_output_node("CYCLES")
         if output is None:
             self.compiler.warn(f"{self.who} has no Material Output node: it renders black")
             return
         if self.resolve(context, output.inputs["Displacement"]).node is not None:
             if material.displacement_method != "BUMP":
                 self.compiler.warn(
-                    f"{self.who}: node '{output.name}' moves the surface; its displacement is rendered as bump alone"
+                    f"{self.who}: node '{self.name_of(output)}' moves the surface; its displacement is rendered as bump alone"
                 )
             NodeBuilder(self, context, output).bump_displacement()
         self.warn_of_volume(context, output)
         self.closure_input(context, output.inputs["Surface"], self.builder.constant(1.0))
 
+    def name_of(self, node) -> str:
+        """As the user knows the node: inlining puts a number before the names of all but outputs."""
+        return NUMBERED.sub("", node.name) if self.inlined else node.name
+
     def warn_of_volume(self, context: Context, output) -> None:
         socket = output.inputs.get("Volume")
         if socket is not None and self.resolve(context, socket).node is not None:
             self.compiler.warn(
-                f"{self.who}: volumes are not rendered yet; node '{output.name}' renders without its volume"
+                f"{self.who}: volumes are not rendered yet; node '{self.name_of(output)}' renders without its volume"
             )
 
     # ---------------------------------------------------------------- following links
@@ -201,7 +222,9 @@ class TreeWalker:
             elif node.type in {"GROUP", "CUSTOM GROUP"}:
                 inside = group_output(node)
                 if inside is None:
-                    self.compiler.warn(f"{self.who}: node group '{node.name}' has no output; it gives its default")
+                    self.compiler.warn(
+                        f"{self.who}: node group '{self.name_of(node)}' has no output; it gives its default"
+                    )
                     return unlinked
                 through.append(kind_of(output))
                 context = Context(node.node_tree, node, context)
@@ -212,6 +235,12 @@ class TreeWalker:
                 through.append(kind_of(output))
                 socket, stays = by_identifier(context.group.inputs, output.identifier), False
                 context = context.parent
+            elif node.bl_idname in NOT_FOR_CYCLES:
+                why = NOT_FOR_CYCLES[node.bl_idname]
+                self.compiler.warn(
+                    f"{self.who}: node '{self.name_of(node)}' ({node.bl_label}) {why}; it is as if not linked, as in Cycles"
+                )
+                return unlinked
             else:
                 return Source(context, node, output, tuple(through))
             if not stays:
@@ -225,7 +254,7 @@ class TreeWalker:
                 continue
             if not link.is_valid:
                 self.compiler.warn(
-                    f"{self.who}: the link into '{socket.name}' of node '{socket.node.name}' is part of a cycle or invalid and is left out"
+                    f"{self.who}: the link into '{socket.name}' of node '{self.name_of(socket.node)}' is part of a cycle or invalid and is left out"
                 )
                 continue
             return link
@@ -263,13 +292,13 @@ class TreeWalker:
             if key in scope:
                 return scope[key]
         if key in self.active:
-            self.compiler.warn(f"{self.who}: node '{node.name}' is part of a cycle; it gives 0 there")
+            self.compiler.warn(f"{self.who}: node '{self.name_of(node)}' is part of a cycle; it gives 0 there")
             return {}
         made = NodeBuilder(self, context, node)
         rule = RULES.get(node.bl_idname)
         if rule is None:
             self.compiler.warn(
-                f"{self.who}: node '{node.name}' ({node.bl_label}) is not supported; it gives its default"
+                f"{self.who}: node '{self.name_of(node)}' ({node.bl_label}) is not supported; it gives its default"
             )
             made.pass_defaults()
         else:
@@ -292,9 +321,11 @@ class TreeWalker:
         rule = CLOSURE_RULES.get(node.bl_idname)
         key = (source.context.key, node.as_pointer())
         if rule is None:
-            self.compiler.warn(f"{self.who}: shader '{node.name}' ({node.bl_label}) is not supported; it renders black")
+            self.compiler.warn(
+                f"{self.who}: shader '{self.name_of(node)}' ({node.bl_label}) is not supported; it renders black"
+            )
         elif key in self.active:
-            self.compiler.warn(f"{self.who}: node '{node.name}' is part of a cycle and is left out there")
+            self.compiler.warn(f"{self.who}: node '{self.name_of(node)}' is part of a cycle and is left out there")
         else:
             self.active.append(key)
             rule(NodeBuilder(self, source.context, node), weight)
@@ -327,6 +358,13 @@ class TreeWalker:
 
 def kind_of(socket) -> str:
     return KIND_OF_SOCKET.get(socket.type, FLOAT)
+
+
+def inlined(owner):
+    """From Blender 5.0 on: the tree without groups, zones, closures, bundles and menus. None before, and where nothing is left of
+    the tree: that it has a cycle is then found by walking it as it is."""
+    made = owner.inline_shader_nodes() if is_inlined(owner) and owner.node_tree is not None else None
+    return made if made and made.node_tree.get_output_node("CYCLES") else None
 
 
 def is_inlined(owner) -> bool:

@@ -85,7 +85,7 @@ class NodeBuilder:
 
     def warn(self, text: str) -> None:
         """One warning for the user, naming the material and this node."""
-        self.compiler.warn(f"{self.walker.who}: node '{self.node.name}' ({self.node.bl_label}): {text}")
+        self.compiler.warn(f"{self.walker.who}: node '{self.walker.name_of(self.node)}' ({self.node.bl_label}): {text}")
 
     def pass_defaults(self) -> None:
         """An unsupported node gives the value of its outputs' own defaults."""

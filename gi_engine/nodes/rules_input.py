@@ -103,12 +103,15 @@ def uv_map(b):
 
 @rule("ShaderNodeAttribute")
 def attribute(b):
-    if b.node.attribute_type == "VIEW_LAYER":
-        value = b.compiler.view_layer_attribute(b.node.attribute_name)
+    kind, name = b.node.attribute_type, b.node.attribute_name
+    if kind == "VIEW_LAYER" or not name:
+        value = b.compiler.view_layer_attribute(name) if name else (0.0, 0.0, 0.0, float(kind == "GEOMETRY"))
         vector, mean, alpha = b.constant(*value[:3]), b.constant(sum(value[:3]) / 3.0), b.constant(value[3])
     else:
-        slot = b.attribute(attribute_name(b.node.attribute_type, b.node.attribute_name))
+        slot = b.attribute(attribute_name(kind, name))
         vector, mean, alpha = b.op("attribute", imm=(slot,))
+        if kind != "GEOMETRY":  # of properties that are not there even alpha is 0
+            alpha = b.op("math_multiply", alpha, b.op("has_attribute", imm=(slot,)))
     b.output("Color", vector)
     b.output("Vector", vector)
     b.output("Fac", mean)
@@ -144,6 +147,13 @@ def light_path(b):
     b.output("Ray Length", b.op("ray_length"))
     for i, name in enumerate(RAY_DEPTHS):
         b.output(name, b.op("ray_depth", imm=(i,)))
+
+
+@rule("GeometryNodeInputSceneTime")
+def scene_time(b):
+    seconds, frame = b.compiler.scene_time()
+    b.output("Seconds", b.constant(seconds))
+    b.output("Frame", b.constant(frame))
 
 
 @rule("ShaderNodeLightFalloff")

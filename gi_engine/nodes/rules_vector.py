@@ -101,7 +101,8 @@ def bump(b):
     if not b.linked("Height"):
         b.output("Normal", normal)
         return
-    width = b.input("Filter Width", default=0.1)
+    socket = b.socket("Filter Width")  # Cycles heeds no link here
+    width = b.constant(float(socket.default_value) if socket else 0.1)
     heights = b.shifted_values(lambda: b.input("Height"), width)
     distance = b.op("math_multiply", b.input("Distance"), -1.0 if b.node.invert else 1.0)
     b.output("Normal", b.op("bump", *heights, b.input("Strength"), distance, width, normal, imm=(False,)))

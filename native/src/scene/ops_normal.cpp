@@ -44,6 +44,12 @@ void normal_map_space(const Operands& o, ShadeState& s) {
 
 // ---------------------------------------------------------------- bump
 
+// A Normal socket's value as it is, whatever its length: Cycles does not make it unit.
+Vec3 given_normal(const Operands& o, const ShadeState& s, int i) {
+  const Vec3 n = o.v(i);
+  return n == Vec3{} || !is_finite(n) ? s.point.ns : n;
+}
+
 // Paths that carry no footprint step by this part of the scene's size.
 constexpr float kDefaultStep = 1e-4f;
 
@@ -92,7 +98,7 @@ void bump_restore(const Operands& o, ShadeState& s) {
 // [Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU"]
 void bump(const Operands& o, ShadeState& s) {
   const float here = o.f(1), along_x = o.f(2), along_y = o.f(3), strength = std::max(o.f(4), 0.0f), distance = o.f(5), width = o.f(6);
-  const Vec3 given = normalize_or(o.v(7), s.point.ns);
+  const Vec3 given = given_normal(o, s, 7);
   Vec3 n = given;
   Steps steps = pixel_steps(s);
   const Instance* instance = o.imm(8) ? instance_of(s) : nullptr;
@@ -114,7 +120,7 @@ void set_normal(const Operands& o, ShadeState& s) { s.point.ns = normalize_or(o.
 
 // height, middle, scale, normal -> offset; object space
 void displacement(const Operands& o, ShadeState& s) {
-  const Vec3 n = normalize_or(o.v(4), s.point.ns);
+  const Vec3 n = given_normal(o, s, 4);
   const float amount = (o.f(1) - o.f(2)) * o.f(3);
   const Instance* i = instance_of(s);
   o.set(0, o.imm(5) && i ? i->to_world.vector(normal_to_object(s, n) * amount) : n * amount);

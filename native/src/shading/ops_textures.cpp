@@ -162,7 +162,7 @@ bool table_has(const int32_t* immediates, size_t tables) {
 
 // sky(colour; direction; image, offset of a SkyDisc)
 void sky_texture(const Operands& a, ShadeState& s) {
-  const Vec3 d = normalize_or(a.v(1), {0, 0, 1});
+  const Vec3 d = a.v(1);  // not made unit
   const SkyDisc disc = from_table<SkyDisc>(s, a.imm(3));
   const Rgb sky = lookup(s, a.imm(2), sky_coordinates(d, disc.rotation), Interpolation::kLinear, Extension::kExtend, false).color;
   const Rgb sum = sky + sun_disc(d, disc);
@@ -171,12 +171,12 @@ void sky_texture(const Operands& a, ShadeState& s) {
 
 // sky_preetham(colour; direction; offset of a PreethamSky)
 void preetham_texture(const Operands& a, ShadeState& s) {
-  a.set(0, preetham(normalize_or(a.v(1), {0, 0, 1}), from_table<PreethamSky>(s, a.imm(2))));
+  a.set(0, preetham(texture::by_angles(a.v(1)), from_table<PreethamSky>(s, a.imm(2))));
 }
 
 // sky_hosek_wilkie(colour; direction; offset of a SunnyHosekWilkieSky)
 void hosek_wilkie_texture(const Operands& a, ShadeState& s) {
-  a.set(0, hosek_wilkie(normalize_or(a.v(1), {0, 0, 1}), from_table<SunnyHosekWilkieSky>(s, a.imm(2))));
+  a.set(0, hosek_wilkie(texture::by_angles(a.v(1)), from_table<SunnyHosekWilkieSky>(s, a.imm(2))));
 }
 
 constexpr Op kTextureOps[] = {

@@ -20,6 +20,12 @@ inline float angle_between(Vec3 a, Vec3 b) { return 2.0f * std::atan2(length(a -
 
 inline float sky_elevation(Vec3 d) { return kPi / 2 - std::acos(std::clamp(d.z, -1.0f, 1.0f)); }
 
+// The unit vector of elevation sky_elevation(d) and of d's azimuth: what Blender takes vectors for that are not unit.
+inline Vec3 by_angles(Vec3 d) {
+  const float z = std::clamp(d.z, -1.0f, 1.0f), across = std::sqrt(sqr(d.x) + sqr(d.y)), r = safe_sqrt(1.0f - z * z);
+  return across > 0.0f ? Vec3{d.x * (r / across), d.y * (r / across), z} : Vec3{0, r, z};
+}
+
 // Where the table holds direction d. The poles have no azimuth; any will do.
 inline Vec2 sky_coordinates(Vec3 d, float rotation) {
   const float turns = (-std::atan2(d.y, d.x) - kPi / 2 + rotation) / (2.0f * kPi);
@@ -27,7 +33,7 @@ inline Vec2 sky_coordinates(Vec3 d, float rotation) {
 }
 
 inline Rgb sun_disc(Vec3 d, const SkyDisc& s) {
-  if (dot(d, s.sun) < s.cos_reach) return Rgb();
+  if (dot(d, s.sun) < s.cos_reach * std::min(1.0f, length(d))) return Rgb();
   const float angle = angle_between(d, s.sun), half = 0.5f * s.diameter, elevation = sky_elevation(d);
   if (!(angle < half) || elevation <= s.horizon) return Rgb();
   const float darkening = 1.0f - 0.6f * (1.0f - safe_sqrt(1.0f - sqr(angle / half)));  // of the limb

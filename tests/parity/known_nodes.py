@@ -1,0 +1,21 @@
+"""Nodes that give other values than in Cycles, and why: rows of docs/parity-nodes.md that are known to fail."""
+
+KNOWN: dict[str, str] = {
+    "ShaderNodeHairInfo": "strands are not rendered",
+    "ShaderNodeNewGeometry": "Pointiness and Random Per Island are not made",
+    "ShaderNodeParticleInfo": "particles are not asked for",
+    "ShaderNodePointInfo": "point clouds are not rendered",
+    "ShaderNodeRadialTiling": "not made",
+    "ShaderNodeRaycast": "not made",
+    "ShaderNodeTexCoord": "coordinates of the instancer are not made",
+    "ShaderNodeTexIES": "not made",
+    "ShaderNodeUVMap": "coordinates of the instancer are not made",
+    "ShaderNodeVolumeInfo": "volumes are not rendered",
+}
+# In one of Blender's versions, or by a pixel more or less than is allowed.
+SOMETIMES: dict[str, str] = {
+    "ShaderNodeTexPointDensity": "up to Blender 4.5: not made",
+    "ShaderNodeTexSky": "up to Blender 4.5 a sun of sixty degrees has another edge where the vector is not unit",
+    "ShaderNodeTexVoronoi": "powers of Minkowski's metric are rounded differently",
+    "ShaderNodeWireframe": "how wide a pixel is differs a little",
+}
