@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from agreement_scenes import clear_glass, program, rough_glass
 from light_scenes import lamp, matrix
-from test_closed_forms import BOUNCES, cube, glass, looking, mesh, quad, scene_of, shiny, sphere, surface
+from test_closed_forms import BOUNCES, cube, glass, looking, mesh, probe, quad, scene_of, shiny, sphere, surface
 
 from gi_engine import scene_data as sd
 from gi_engine.session import Session
@@ -79,6 +80,25 @@ def test_two_squares(way):
         mean, error = repeated(8, scene, (0, 0, 0.5), direction, samples=8, particles=20000, texel_size=0.1, **way)
         assert abs(math.pi * mean - truth) < 4 * math.pi * error + 0.005 * truth
         assert math.pi * error < 0.02 * truth
+
+
+@pytest.mark.parametrize("fill", [clear_glass, rough_glass])
+def test_what_lies_in_glass_is_path_tracing_s(fill):
+    """A grey disc in a ball of glass under an even sky: there light is denser than paths from the eye know of."""
+
+    def scene():
+        disc = quad((-0.5, -0.5, 0), (0.5, -0.5, 0), (0.5, 0.5, 0), (-0.5, 0.5, 0))
+        return scene_of((sphere(rings=32), program(fill)), (disc, surface(0.5)), world=1.0)
+
+    where = ((0, 0, 0.1), (0, 0, -1))
+    truth = np.array([probe(scene(), *where, samples=64, seed=k).mean() for k in range(4)])
+    mean, error = repeated(8, scene(), *where, samples=4, particles=40000, texel_size=0.2)
+    assert error < 0.01 * truth.mean()
+    assert abs(mean - truth.mean()) < 4 * math.hypot(error, truth.std(ddof=1) / 2) + 0.005 * truth.mean(), (
+        mean,
+        error,
+        truth,
+    )
 
 
 def room():

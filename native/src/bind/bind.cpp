@@ -24,5 +24,6 @@ NB_MODULE(_core, m) {
   gi::bind::bind_lights(m);
   gi::bind::bind_guide(m);
   gi::bind::bind_points(m);
+  gi::bind::bind_connections(m);
   gi::bind::bind_irradiance(m);
 }

@@ -17,6 +17,7 @@ void bind_bsdf(nanobind::module_& m);
 void bind_lights(nanobind::module_& m);
 void bind_guide(nanobind::module_& m);
 void bind_points(nanobind::module_& m);
+void bind_connections(nanobind::module_& m);
 void bind_irradiance(nanobind::module_& m);
 
 // The images of a scene_data.Scene.

@@ -3,6 +3,7 @@
 #include "integrators/integrator.h"
 #include "transport/diffuse_end.h"
 #include "transport/emission_guide.h"
+#include "transport/subpath.h"
 #include "transport/texels.h"
 
 namespace gi {
@@ -67,6 +68,7 @@ struct Particle {
   Sampler sampler;
   Ray ray;
   Rgb power;
+  float seen = 1;  // of what it lights: in glass light is n² times as dense [Veach 1997, §5.2], which paths from the eye leave out
   ParticleBounces bounces;
   PathState state;
   uint32_t bounce = 0;
@@ -238,7 +240,7 @@ double ParticleIntegrator::carry(const RenderContext& context, const EmittedRay&
     // Leave the power, whether the particle goes on or not.
     const bool is_lit = !is_direct || context.lights.turns_to(emitted, point.position);
     if ((bsdf.flags() & kDiffuse) && is_lit && p.bounces.reaches_diffuse(s_.limits) && (!is_direct || direct_in_texels(context))) {
-      worth += texels_->deposit(point, point.backfacing, p.power * diffuse_share(point, bsdf));
+      worth += texels_->deposit(point, point.backfacing, p.power * (p.seen * diffuse_share(point, bsdf)));
       if (finding_the_way_) worth += double(average(p.power) * seen_.density(point.position));
     }
 
@@ -252,6 +254,10 @@ double ParticleIntegrator::carry(const RenderContext& context, const EmittedRay&
     if (next && !transparent) left *= adjoint_factor(point, bsdf, next->wi);
     const double before = sum(p.power), after = sum(left), alpha = std::min(1.0, after / before);
     if (!(double(u_absorb) < alpha)) break;
+    if (next->flags & kTransmission && !transparent) {
+      const double made = sum(p.power * adjoint(context, point, bsdf, *next, p.state).factor);
+      p.seen *= float(made / after);
+    }
     p.power = left * float(1.0 / alpha);
     ledger.created += std::max(after - before, 0.0);
 

@@ -16,10 +16,10 @@ class LightChoice {
   }
 
   void add(const LightVertex& v, uint32_t index) {
-    if (v.bsdf.is_delta()) return;
-    const Vec3 p = v.point.position, n = v.point.ng;
-    const bool both_sides = v.bsdf.flags() & kTransmission;
-    const float values[kColumns] = {p.x, p.y, p.z, n.x, n.y, n.z, max_component(abs(v.power)), both_sides ? 1.0f : 0.0f};
+    if (!v.bsdf.is_delta()) add(v.point.position, v.point.ng, max_component(abs(v.power)), v.bsdf.flags() & kTransmission, index);
+  }
+  void add(Vec3 p, Vec3 n, float power, bool both_sides, uint32_t index) {
+    const float values[kColumns] = {p.x, p.y, p.z, n.x, n.y, n.z, power, both_sides ? 1.0f : 0.0f};
     for (size_t k = 0; k < kColumns; ++k) columns_[k].push_back(values[k]);
     vertices_.push_back(index);
   }

@@ -78,6 +78,13 @@ Rgb passage(const RenderContext& context, Ray ray, uint32_t visibility, PathStat
   return Rgb();
 }
 
+Adjoint adjoint(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, const BsdfSample& next, const PathState& path,
+                uint32_t seen_by) {
+  if (next.flags & kSpecular) return {delta_factor(context, point, next, seen_by) / next.pdf_dir, 0.0f};
+  const LobeEval e = eval_turned(context, point, bsdf, next.wi, path, seen_by);
+  return {e.value * (abs_dot(point.ng, next.wi) / (abs_dot(point.ng, point.wo) * next.pdf_dir)), e.pdf_dir};
+}
+
 void trace_from_light(const RenderContext& context, const SubpathSettings& settings, Sampler& sampler, LightVertices& vertices) {
   const Heuristic h = settings.heuristic;
   const float u_choice = sampler.next_1d();
@@ -147,17 +154,9 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     // The next vertex will have to scatter too.
     if (!carried.bounces.within(settings.limits) || carried.bounces.total >= std::min(settings.limits.total, v.max_bounces)) return;
 
-    // What the surface makes of the light as seen from where it goes, in the measure of the true normal. [Veach 1997, §5.3]
     const float cos_out = abs_dot(v.point.ng, next->wi);
     const bool is_delta = next->flags & kSpecular;
-    Rgb factor;
-    float pdf_reverse = 0;
-    if (is_delta) {
-      factor = delta_factor(context, v.point, *next, v.seen_by) / next->pdf_dir;
-    } else {
-      const LobeEval e = eval_turned(context, v.point, v.bsdf, next->wi, state, v.seen_by);
-      factor = e.value * (cos_out / (cos_in * next->pdf_dir)), pdf_reverse = e.pdf_dir;
-    }
+    const auto [factor, pdf_reverse] = adjoint(context, v.point, v.bsdf, *next, state, v.seen_by);
     if (is_black(factor)) return;
 
     // Russian roulette by what is left.

@@ -128,6 +128,15 @@ PathState unknown_state();
 // f |cos θ| of the lobes by which `seen_by` (RayKind bits) sees what is towards wi; the density is of all.
 LobeEval eval_seen_by(const Bsdf& bsdf, Vec3 wo, Vec3 wi, uint32_t seen_by);
 
+// What the surface makes of light from point.wo that goes on to `next`, as seen from there, in the measure of the true normal [Veach 1997,
+// §5.3]; and the density of the way back, 0 for delta lobes.
+struct Adjoint {
+  Rgb factor;
+  float pdf_reverse = 0;
+};
+Adjoint adjoint(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, const BsdfSample& next, const PathState& path,
+                uint32_t seen_by = 0xffffffffu);
+
 // Whether light subpaths may begin with a ray to this surface.
 inline bool meets_light(const Scene& scene, const ShadingPoint& point) {
   const uint32_t v = scene.instances()[point.instance].data->visibility;
