@@ -58,7 +58,8 @@ class Instance:
     holdout: bool = False
     shadow_terminator_offset: float = 0.0  # Blender's Shading Offset
     shadow_terminator_geometry_offset: float = 0.0
-    attributes: dict[str, tuple] = field(default_factory=dict)  # object and instancer attributes: name -> 4 floats
+    # Object and instancer attributes: name -> 4 floats, or (n, 4) float32 for n places.
+    attributes: dict = field(default_factory=dict)
 
     @property
     def count(self) -> int:

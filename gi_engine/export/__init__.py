@@ -16,6 +16,7 @@ from .images import release_scratch
 from .lights import export_light
 from .mesh import export_mesh
 from .objects import Collected, collect, place
+from .places import read_places
 from .settings import export_settings, resolve
 from .shaders import Shaders
 from .warnings import Warnings
@@ -56,7 +57,7 @@ def export(
     out.world = export_world(world, shaders.world(world) if world else -1)
     export_lights(out, found, shaders, warnings)
     if view_layer.use_solid:
-        export_objects(out, found, shaders, warnings, {lightmap} - {""})
+        export_objects(out, found, depsgraph, shaders, warnings, {lightmap} - {""})
     if scene.render.use_motion_blur:
         warnings.add("motion blur is not supported yet; rendered without")
     release_scratch()
@@ -84,7 +85,9 @@ def export_lights(out: Scene, found: Collected, shaders: Shaders, warnings: Warn
                 warnings.add("the area light has no size and gives no light", name)
 
 
-def export_objects(out: Scene, found: Collected, shaders: Shaders, warnings: Warnings, attributes: set[str]) -> None:
+def export_objects(
+    out: Scene, found: Collected, depsgraph, shaders: Shaders, warnings: Warnings, attributes: set[str]
+) -> None:
     # Programs first: they say which attributes the meshes have to bring.
     slots = [shaders.slots(prototype.materials) for prototype in found.prototypes]
     wanted = shaders.wanted_attributes() | attributes
@@ -97,6 +100,8 @@ def export_objects(out: Scene, found: Collected, shaders: Shaders, warnings: War
             index_of[key] = add_mesh(out, prototype, wanted, warnings)
     meshes = [index_of[prototype.mesh.as_pointer()] for prototype in found.prototypes]
     values = [shaders.object_attributes(prototype) for prototype in found.prototypes]
+    for known, own in zip(values, read_places(depsgraph, found.prototypes, wanted), strict=True):
+        known.update(own)
     out.instances = place(found, meshes, slots, values, warnings)
 
 

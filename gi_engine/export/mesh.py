@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..nodes.attributes import ACTIVE_COLOR, UNDEFORMED
+from .. import native
+from ..nodes.attributes import ACTIVE_COLOR, ISLAND, POINTINESS, UNDEFORMED
 from ..scene_data import Attribute, Mesh
 from .arrays import is_triangulated, read, read_attribute, triangle_corners
 
@@ -74,6 +75,45 @@ def read_attributes(mesh, wanted: set[str], active_uv: str):
     if UNDEFORMED in wanted:
         positions = read(mesh.vertices, "undeformed_co", 3, np.float32)
         yield Attribute(UNDEFORMED, "POINT", positions)
+    if POINTINESS in wanted:
+        yield Attribute(POINTINESS, "POINT", pointiness(mesh)[:, None])
+    if ISLAND in wanted:
+        numbers = native.module().random_by_island(read_edges(mesh), len(mesh.vertices))
+        yield Attribute(ISLAND, "POINT", np.asarray(numbers)[:, None])
+
+
+def read_edges(mesh) -> np.ndarray:
+    return read(mesh.edges, "vertices", 2, np.int32)
+
+
+def pointiness(mesh) -> np.ndarray:
+    """(V,) float32: the angle between the normal and the mean of the edges, over pi, smoothed once over neighbours.
+
+    Vertices in the same place count as one."""
+    positions, normals = read_positions(mesh), read(mesh.vertex_normals, "vector", 3, np.float32)
+    _, welded = np.unique(positions, axis=0, return_inverse=True)
+    welded = welded.reshape(-1)
+    count = int(welded.max()) + 1 if len(welded) else 0
+    place = np.zeros((count, 3), np.float32)
+    place[welded] = positions
+    normal = summed(welded, normals, count)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
+    edges = np.unique(np.sort(welded[read_edges(mesh)], axis=1), axis=0)
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    along = place[edges[:, 1]] - place[edges[:, 0]]
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-20)
+    ends = np.concatenate([edges[:, 0], edges[:, 1]])
+    neighbours = np.bincount(ends, minlength=count)
+    mean = summed(ends, np.concatenate([along, -along]), count) / np.maximum(neighbours, 1)[:, None]
+    raw = np.arccos(np.clip((normal * mean).sum(1), -1.0, 1.0)) / np.pi
+    raw[neighbours == 0] = 0.0
+    others = np.bincount(ends, raw[np.concatenate([edges[:, 1], edges[:, 0]])], minlength=count)
+    return ((raw + others) / (neighbours + 1))[welded].astype(np.float32)
+
+
+def summed(index: np.ndarray, vectors: np.ndarray, count: int) -> np.ndarray:
+    """Sums of vectors by index."""
+    return np.stack([np.bincount(index, vectors[:, k], minlength=count) for k in range(3)], 1)
 
 
 def read_one(attribute, name: str):

@@ -237,6 +237,7 @@ def place(
         if not good.all():
             warnings.add("its matrix is singular or not finite; left out", prototype.name)
             matrices, randoms = matrices[good], randoms[good]
+            values = {n: v[good] if np.ndim(v) == 2 and len(v) == len(good) else v for n, v in values.items()}
         if not len(matrices):
             continue
         single = len(matrices) == 1
@@ -253,7 +254,7 @@ def place(
                 holdout=prototype.holdout,
                 shadow_terminator_offset=prototype.shadow_terminator_offset,
                 shadow_terminator_geometry_offset=prototype.shadow_terminator_geometry_offset,
-                attributes=values,
+                attributes={n: v[0] if np.ndim(v) == 2 and (single or len(v) == 1) else v for n, v in values.items()},
             )
         )
     return instances

@@ -7,6 +7,16 @@ from __future__ import annotations
 
 UNDEFORMED = ".undeformed"  # positions before deformation, for Generated coordinates
 ACTIVE_COLOR = ".active_color"  # the colour attribute that renders
+POINTINESS = ".pointiness"  # how far the surface bulges, by its edges
+ISLAND = ".island"  # a random number for each part of the mesh that hangs together
+# What each place of an instance knows: coordinates where its instancer made it, and its particle.
+INSTANCER_GENERATED, INSTANCER_UV = "\x02generated", "\x02uv"
+PARTICLE_STATE = "\x02particle state"  # index, random, age; lifetime
+PARTICLE_PLACE = "\x02particle place"  # location; size
+PARTICLE_VELOCITY, PARTICLE_SPIN = "\x02particle velocity", "\x02particle spin"
+OF_PLACES = frozenset(
+    {INSTANCER_GENERATED, INSTANCER_UV, PARTICLE_STATE, PARTICLE_PLACE, PARTICLE_VELOCITY, PARTICLE_SPIN}
+)
 PREFIXES = {"OBJECT": "\x01object:", "INSTANCER": "\x01instancer:"}  # properties, by their data path
 
 

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from .attributes import ACTIVE_COLOR, UNDEFORMED, attribute_name
+from .attributes import (
+    ACTIVE_COLOR,
+    INSTANCER_GENERATED,
+    INSTANCER_UV,
+    ISLAND,
+    PARTICLE_PLACE,
+    PARTICLE_SPIN,
+    PARTICLE_STATE,
+    PARTICLE_VELOCITY,
+    POINTINESS,
+    UNDEFORMED,
+    attribute_name,
+)
 from .rules import rule
 from .rules_vector import object_rows
 
@@ -19,6 +31,7 @@ RAY_KINDS = {
     "Is Volume Scatter Ray": 128,
 }
 RAY_DEPTHS = ("Ray Depth", "Diffuse Depth", "Glossy Depth", "Transparent Depth", "Transmission Depth", "Portal Depth")
+ANY_DISTANCE = 1e30  # what Ambient Occlusion takes a distance of 0 for
 AXES = {"X": 0, "Y": 1, "Z": 2}
 
 
@@ -36,17 +49,21 @@ def radial_tangent(b, axis: str = "Z"):
 
 @rule("ShaderNodeTexCoord")
 def texture_coordinate(b):
+    instancer = b.node.from_instancer
     if b.wants("Generated"):
-        b.output("Generated", generated(b))
+        b.output("Generated", named(b, INSTANCER_GENERATED)[0] if instancer else generated(b))
     if b.wants("UV"):
-        b.output("UV", b.op("uv", imm=(b.attribute(""),)))
-    if b.node.from_instancer and (b.wants("Generated") or b.wants("UV")):
-        b.warn("coordinates of the instancer are not supported; it gives the object's own")
+        b.output("UV", named(b, INSTANCER_UV)[0] if instancer else b.op("uv", imm=(b.attribute(""),)))
     b.output("Normal", b.op("object_normal"))
     b.output("Object", object_coordinates(b, b.node.object))
     b.output("Camera", b.op("camera_coordinates"))
     b.output("Window", b.op("window"))
     b.output("Reflection", b.op("reflection"))
+
+
+def named(b, name: str) -> tuple:
+    """Vector, mean and fourth number of an attribute."""
+    return b.op("attribute", imm=(b.attribute(name),))
 
 
 def object_coordinates(b, owner):
@@ -72,10 +89,9 @@ def geometry(b):
         b.output(name, b.op(op))
     if b.wants("Tangent"):
         b.output("Tangent", radial_tangent(b))
-    for name, neutral in {"Pointiness": 0.5, "Random Per Island": 0.0}.items():
-        b.output(name, b.constant(neutral))
+    for name, attribute in {"Pointiness": POINTINESS, "Random Per Island": ISLAND}.items():
         if b.wants(name):
-            b.warn(f"{name} is not supported; it gives {neutral}")
+            b.output(name, named(b, attribute)[1])
 
 
 @rule("ShaderNodeTangent")
@@ -96,9 +112,9 @@ def wireframe(b):
 
 @rule("ShaderNodeUVMap")
 def uv_map(b):
-    if b.node.from_instancer:
-        b.warn("coordinates of the instancer are not supported; it gives the object's own")
-    b.output("UV", b.op("uv", imm=(b.attribute(b.node.uv_map),)))
+    b.output(
+        "UV", named(b, INSTANCER_UV)[0] if b.node.from_instancer else b.op("uv", imm=(b.attribute(b.node.uv_map),))
+    )
 
 
 @rule("ShaderNodeAttribute")
@@ -181,24 +197,59 @@ def camera_data(b):
         b.output(name, value)
 
 
-# -------------------------------------------------------------------- what has a fallback
+# -------------------------------------------------------------------- what looks around by rays
 
 
 @rule("ShaderNodeBevel")
 def bevel(b):
-    b.warn("bevels are not rendered; it gives its normal")
-    b.output("Normal", b.linked_or("Normal", b.op("normal")))
+    normal = b.linked_or("Normal", b.op("normal"))
+    b.output("Normal", b.op("bevel", b.input("Radius"), normal, imm=(b.node.samples,)))
 
 
 @rule("ShaderNodeAmbientOcclusion")
 def ambient_occlusion(b):
-    b.warn("ambient occlusion is not supported; nothing is occluded")
-    b.output("Color", b.input("Color"))
-    b.output("AO", b.constant(1.0))
+    n = b.node
+    distance = b.input("Distance")
+    if not b.linked("Distance") and b.socket("Distance").default_value == 0.0:
+        distance = b.constant(ANY_DISTANCE)
+    normal = b.linked_or("Normal", b.op("normal"))
+    free = b.op("ambient_occlusion", distance, normal, imm=(n.samples, n.inside, n.only_local))
+    b.output("AO", free)
+    b.output("Color", b.op("vector_scale", b.input("Color"), free))
 
 
-@rule("ShaderNodeHairInfo", "ShaderNodeParticleInfo", "ShaderNodePointInfo", "ShaderNodeVolumeInfo")
-def no_such_information(b):
-    b.warn("objects do not carry this information here; it gives zeros")
+@rule("ShaderNodeRaycast")
+def raycast(b):
+    ray = (b.linked_or("Position", b.op("position")), b.linked_or("Direction", b.op("normal")), b.input("Length"))
+    local = (b.node.only_local,)
+    names = ("Is Hit", "Self Hit", "Hit Distance", "Hit Position", "Hit Normal")
+    for name, value in zip(names, b.op("raycast", *ray, imm=local), strict=True):
+        b.output(name, value)
+    for socket in b.node.outputs:
+        if socket.name in names or not socket.identifier or not b.wants(socket.identifier):
+            continue
+        vector, mean, _alpha = b.op("raycast_attribute", *ray, imm=(*local, b.attribute(socket.name)))
+        b.output(socket.identifier, mean if socket.type in ("VALUE", "INT", "BOOLEAN") else vector)
+
+
+# -------------------------------------------------------------------- particles, and what meshes are not
+
+
+@rule("ShaderNodeParticleInfo")
+def particle_info(b):
+    state, _, lifetime = named(b, PARTICLE_STATE)
+    for i, name in enumerate(("Index", "Random", "Age")):
+        b.output(name, b.component(state, i))
+    b.output("Lifetime", lifetime)
+    location, _, size = named(b, PARTICLE_PLACE)
+    b.output("Location", location)
+    b.output("Size", size)
+    b.output("Velocity", named(b, PARTICLE_VELOCITY)[0])
+    b.output("Angular Velocity", named(b, PARTICLE_SPIN)[0])
+
+
+@rule("ShaderNodeHairInfo", "ShaderNodePointInfo", "ShaderNodeVolumeInfo")
+def not_of_meshes(b):
+    """Zeros on meshes, as in Cycles; strands, points and volumes themselves are left out elsewhere, under a warning."""
     for socket in b.node.outputs:
         b.output(socket.identifier, b.constant(0.0))

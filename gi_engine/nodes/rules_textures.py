@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from .attributes import UNDEFORMED
+from .ies import ies_table
 from .program import COLOR, VECTOR
 from .rules import rule
 from .sky import sky_texture
@@ -30,6 +31,7 @@ METRICS = {"EUCLIDEAN": 0, "MANHATTAN": 1, "CHEBYCHEV": 2, "MINKOWSKI": 3}
 INTERPOLATIONS = {"Closest": 0, "Linear": 1, "Cubic": 2, "Smart": 2}
 EXTENSIONS = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}
 PROJECTIONS = {"FLAT": 0, "SPHERE": 1, "TUBE": 2}
+UNREADABLE_IES = 100.0  # Cycles' own answer
 ENVIRONMENTS = {"EQUIRECTANGULAR": 0, "MIRROR_BALL": 1}
 
 
@@ -236,3 +238,16 @@ def no_image(b) -> None:
 @rule("ShaderNodeTexSky")
 def sky(b):
     b.output("Color", sky_texture(b, vector(b, generated)))
+
+
+@rule("ShaderNodeTexIES")
+def ies(b):
+    from ..export.texts import ies_text  # needs bpy
+
+    direction = b.input("Vector") if b.linked("Vector") else b.op("object_incoming")
+    table = ies_table(ies_text(b.node))
+    if table is None:
+        b.warn("has no IES data that can be read and gives 100, as in Cycles")
+        b.output("Fac", b.op("math_multiply", b.input("Strength"), UNREADABLE_IES))
+        return
+    b.output("Fac", b.op("ies", direction, b.input("Strength"), imm=(b.table(table), len(table))))

@@ -1,16 +1,7 @@
 """Nodes that give other values than in Cycles, and why: rows of docs/parity-nodes.md that are known to fail."""
 
 KNOWN: dict[str, str] = {
-    "ShaderNodeHairInfo": "strands are not rendered",
-    "ShaderNodeNewGeometry": "Pointiness and Random Per Island are not made",
-    "ShaderNodeParticleInfo": "particles are not asked for",
-    "ShaderNodePointInfo": "point clouds are not rendered",
     "ShaderNodeRadialTiling": "not made",
-    "ShaderNodeRaycast": "not made",
-    "ShaderNodeTexCoord": "coordinates of the instancer are not made",
-    "ShaderNodeTexIES": "not made",
-    "ShaderNodeUVMap": "coordinates of the instancer are not made",
-    "ShaderNodeVolumeInfo": "volumes are not rendered",
 }
 # In one of Blender's versions, or by a pixel more or less than is allowed.
 SOMETIMES: dict[str, str] = {

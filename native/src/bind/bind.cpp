@@ -25,5 +25,6 @@ NB_MODULE(_core, m) {
   gi::bind::bind_guide(m);
   gi::bind::bind_points(m);
   gi::bind::bind_connections(m);
+  gi::bind::bind_hash(m);
   gi::bind::bind_irradiance(m);
 }

@@ -75,7 +75,10 @@ struct Record {
   // A contiguous array of any shape; None is empty.
   template <class T>
   Array<T> array(const char* field, bool convert = false) const {
-    nb::object value = at(field);
+    return array_of<T>(at(field), field, convert);
+  }
+  template <class T>
+  Array<T> array_of(nb::object value, const char* field, bool convert = true) const {
     if (value.is_none()) return {};
     using Nd = nb::ndarray<T, nb::c_contig, nb::device::cpu>;
     Nd nd;
@@ -164,9 +167,14 @@ void read_instances(const Record& r, std::vector<InstanceData>& all) {
   i.shadow_terminator_offset = r.real("shadow_terminator_offset");
   i.shadow_terminator_geometry_offset = r.real("shadow_terminator_geometry_offset");
   nb::dict attributes = r.get<nb::dict>("attributes");
+  std::vector<std::pair<size_t, Array<const float>>> by_place;  // which of the attributes
   for (auto [name, value] : attributes) {
     InstanceAttribute a{nb::cast<std::string>(name), {0, 0, 0, 1}};
-    for (size_t k = 0; k < 4; ++k) a.value[k] = float(nb::cast<double>(nb::float_(nb::object(value[nb::int_(k)]))));
+    if (nb::hasattr(value, "ndim") && nb::cast<int>(value.attr("ndim")) == 2) {
+      by_place.emplace_back(i.attributes.size(), r.array_of<const float>(nb::borrow(value), "attributes"));
+    } else {
+      for (size_t k = 0; k < 4; ++k) a.value[k] = float(nb::cast<double>(nb::float_(nb::object(value[nb::int_(k)]))));
+    }
     i.attributes.push_back(a);
   }
   const std::vector<Affine> matrices = r.matrices("matrix");
@@ -174,9 +182,12 @@ void read_instances(const Record& r, std::vector<InstanceData>& all) {
   const Array<const float> randoms = many ? r.array<const float>("random", true) : Array<const float>{};
   require(!many || randoms.size == matrices.size(), r.who + ": 'random' must have one number for each matrix");
   if (!many) i.random = r.real("random");
+  for (const auto& place : by_place)
+    require(place.second.size == 4 * matrices.size(), r.who + ": an attribute of places must have four numbers for each matrix");
   for (size_t k = 0; k < matrices.size(); ++k) {
     i.matrix = matrices[k];
     if (many) i.random = randoms[k];
+    for (const auto& [which, values] : by_place) std::copy_n(values.data + 4 * k, 4, i.attributes[which].value);
     all.push_back(i);
   }
 }

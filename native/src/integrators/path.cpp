@@ -82,7 +82,6 @@ class PathIntegrator final : public Integrator {
     Bsdf bsdf;
     CameraPath path(camera);
     bool may_scatter = true;  // false past the bounce limit: the next surface only emits
-    float least_pdf = kInf;   // of the directions so far, per steradian
 
     const int first_depth = context.lightmap ? context.lightmap->first_depth() : 0;
     const auto add = [&](Rgb radiance, int depth) {
@@ -111,7 +110,7 @@ class PathIntegrator final : public Integrator {
 
       const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
       // The less likely the path, the less sharp what it sees: as Blender's Filter Glossy does it.
-      if (least_pdf < s_.filter_glossy) bsdf.blur(0.5f * std::sqrt(1.0f - least_pdf / s_.filter_glossy));
+      if (path.state.least_pdf < s_.filter_glossy) bsdf.blur(0.5f * std::sqrt(1.0f - path.state.least_pdf / s_.filter_glossy));
 
       // Add what the surface emits, then what lights send to it.
       const Rgb emitted = surface_emission(context, point, bsdf.emission, path.origin, mode);
@@ -144,6 +143,7 @@ class PathIntegrator final : public Integrator {
         path.origin.query.path = path.state;
         continue;
       }
+      const float least_pdf = path.state.least_pdf;
       may_scatter = advance(path.state, next->flags, s_.limits);
       const FilmSpec& spec = film.spec();
       const bool through_glass = spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness;
@@ -151,7 +151,7 @@ class PathIntegrator final : public Integrator {
       path.state.without = next->flags & kDiffuse ? s_.without : 0;
       const bool delta = next->flags & kSpecular;
       path.origin = {light_query(point, bsdf), delta ? kInf : next->pdf_dir};
-      if (!delta) least_pdf = std::min(least_pdf, next->pdf_dir);
+      path.state.least_pdf = delta ? least_pdf : std::min(least_pdf, next->pdf_dir);
       path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
 
       // Russian roulette.

@@ -26,6 +26,17 @@ void collect_hit(const FilterArguments* a) {
   a->valid[0] = 0;  // go on
 }
 
+struct OneContext {
+  Context context;
+  uint32_t instance;
+};
+
+void keep_instance(const FilterArguments* a) {
+  const auto* one = reinterpret_cast<const OneContext*>(a->context);
+  const embree::Hit& h = *a->hit;
+  if ((h.instance[0] != kInvalidId ? h.instance[0] : h.geometry) != one->instance) a->valid[0] = 0;
+}
+
 class EmbreeAccel final : public Accel {
  public:
   EmbreeAccel(const std::string& library, std::vector<AccelMesh> meshes, std::vector<AccelInstance> instances, int threads)
@@ -52,14 +63,17 @@ class EmbreeAccel final : public Accel {
   ~EmbreeAccel() override { release(); }
 
   std::optional<gi::Hit> intersect(const gi::Ray& ray, uint32_t mask) const override {
-    RayHit rh;
-    fill(rh.ray, ray, mask);
-    rh.hit.geometry = kInvalidId, rh.hit.instance[0] = kInvalidId;
     QueryArguments arguments;
-    api_.Intersect1(top_, &rh, &arguments);
-    if (rh.hit.geometry == kInvalidId) return {};
-    const uint32_t instance = rh.hit.instance[0] != kInvalidId ? rh.hit.instance[0] : rh.hit.geometry;
-    return gi::Hit{rh.ray.t_far, instance, rh.hit.primitive, rh.hit.u, rh.hit.v};
+    return nearest(ray, mask, arguments);
+  }
+
+  std::optional<gi::Hit> intersect_instance(const gi::Ray& ray, uint32_t instance) const override {
+    OneContext one{{{kInvalidId}, {kInvalidId}}, instance};
+    QueryArguments arguments;
+    arguments.flags = kInvokeArgumentFilter;
+    arguments.context = &one.context;
+    arguments.filter = &keep_instance;
+    return nearest(ray, 0xffffffffu, arguments);
   }
 
   bool occluded(const gi::Ray& ray, uint32_t mask) const override {
@@ -93,6 +107,16 @@ class EmbreeAccel final : public Accel {
   std::string description() const override { return description_; }
 
  private:
+  std::optional<gi::Hit> nearest(const gi::Ray& ray, uint32_t mask, QueryArguments& arguments) const {
+    RayHit rh;
+    fill(rh.ray, ray, mask);
+    rh.hit.geometry = kInvalidId, rh.hit.instance[0] = kInvalidId;
+    api_.Intersect1(top_, &rh, &arguments);
+    if (rh.hit.geometry == kInvalidId) return {};
+    const uint32_t instance = rh.hit.instance[0] != kInvalidId ? rh.hit.instance[0] : rh.hit.geometry;
+    return gi::Hit{rh.ray.t_far, instance, rh.hit.primitive, rh.hit.u, rh.hit.v};
+  }
+
   static void on_error(void* self, int code, const char* text) {
     auto* accel = static_cast<EmbreeAccel*>(self);
     accel->failed_ = true;

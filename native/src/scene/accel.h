@@ -37,6 +37,8 @@ class Accel {
   virtual bool occluded(const Ray& ray, uint32_t mask) const = 0;
   // Every hit along the ray, nearest first, each once.
   virtual void all_hits(const Ray& ray, uint32_t mask, std::vector<Hit>& hits) const = 0;
+  // As intersect, but of one instance alone, whoever sees it.
+  virtual std::optional<Hit> intersect_instance(const Ray& ray, uint32_t instance) const = 0;
   virtual size_t memory_bytes() const = 0;
   virtual std::string description() const = 0;  // file and version of Embree
 };

@@ -20,6 +20,7 @@ void incoming(const Operands& o, ShadeState& s) { o.set(0, s.point.wo); }
 void backfacing(const Operands& o, ShadeState& s) { o.set(0, s.point.backfacing ? 1.0f : 0.0f); }
 void parametric(const Operands& o, ShadeState& s) { o.set(0, Vec3{1.0f - s.point.b1 - s.point.b2, s.point.b1, 0.0f}); }
 void object_normal(const Operands& o, ShadeState& s) { o.set(0, normal_to_object(s, s.point.ns)); }
+void object_incoming(const Operands& o, ShadeState& s) { o.set(0, normal_to_object(s, s.point.wo)); }
 void generated(const Operands& o, ShadeState& s) { o.set(0, generated_coordinates(s, o.imm(1))); }
 
 void reflection(const Operands& o, ShadeState& s) {
@@ -204,6 +205,7 @@ const Op kOps[] = {
     {"backfacing", "f", "", 0, kContext, backfacing},
     {"parametric", "v", "", 0, kContext, parametric},
     {"object_normal", "v", "", 0, kContext, object_normal},
+    {"object_incoming", "v", "", 0, kContext, object_incoming},
     {"generated", "v", "", 1, kContext, generated},
     {"reflection", "v", "", 0, kContext, reflection},
     {"wireframe", "f", "f", 1, kContext, wireframe},

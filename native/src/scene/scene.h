@@ -37,6 +37,16 @@ class Scene {
     count_ray();
     return accel_->intersect(ray, visibility);
   }
+  // Of one instance alone, whoever sees it: for subsurface scattering and for the nodes that look at their own object.
+  std::optional<Hit> intersect_instance(const Ray& ray, uint32_t instance) const {
+    count_ray();
+    return accel_->intersect_instance(ray, instance);
+  }
+  // Whether something that casts full shadows is in the way.
+  bool occluded(const Ray& ray) const {
+    count_ray();
+    return accel_->occluded(ray, kRayShadow);
+  }
   // Fraction of light that passes along a shadow ray: 0 or 1 for opaque scenes, programs decide for transparent surfaces.
   Rgb transmittance(const Ray& ray, const PathState& path) const;
 

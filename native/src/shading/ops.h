@@ -11,6 +11,7 @@ std::span<const Op> vector_ops();
 std::span<const Op> color_ops();
 std::span<const Op> input_ops();
 std::span<const Op> normal_ops();
+std::span<const Op> ray_ops();
 std::span<const Op> texture_ops();
 std::span<const Op> closure_ops();
 std::span<const Op> principled_ops();

@@ -6,6 +6,7 @@
 #include "shading/textures/checker.h"
 #include "shading/textures/gabor.h"
 #include "shading/textures/gradient.h"
+#include "shading/textures/ies.h"
 #include "shading/textures/magic.h"
 #include "shading/textures/noise.h"
 #include "shading/textures/projection.h"
@@ -179,6 +180,16 @@ void hosek_wilkie_texture(const Operands& a, ShadeState& s) {
   a.set(0, hosek_wilkie(texture::by_angles(a.v(1)), from_table<SunnyHosekWilkieSky>(s, a.imm(2))));
 }
 
+// ies(factor; direction, strength; offset of an IesTable, its size)
+void ies_texture(const Operands& a, ShadeState& s) {
+  const Vec3 d = normalize(a.v(1));
+  const float h = std::atan2(d.x, d.y) + kPi, v = std::acos(std::clamp(-d.z, -1.0f, 1.0f));
+  a.set(0, a.f(2) * IesTable(s.tables + a.imm(3)).at(h, v));
+}
+bool ies_fits(const int32_t* immediates, size_t tables) {
+  return immediates[0] >= 0 && immediates[1] >= 6 && int64_t(immediates[0]) + immediates[1] <= int64_t(tables);
+}
+
 constexpr Op kTextureOps[] = {
     {"noise", "fv", "vffffffff", 4, OpKind::kPure, noise},
     {"white_noise", "fv", "vf", 1, OpKind::kPure, white_noise},
@@ -196,6 +207,7 @@ constexpr Op kTextureOps[] = {
     {"sky", "v", "v", 2, OpKind::kContext, sky_texture, 0, table_has<SkyDisc, 1>},
     {"sky_preetham", "v", "v", 1, OpKind::kContext, preetham_texture, 0, table_has<PreethamSky, 0>},
     {"sky_hosek_wilkie", "v", "v", 1, OpKind::kContext, hosek_wilkie_texture, 0, table_has<SunnyHosekWilkieSky, 0>},
+    {"ies", "f", "vf", 2, OpKind::kPure, ies_texture, 0, ies_fits},
 };
 
 }  // namespace
