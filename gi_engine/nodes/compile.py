@@ -149,7 +149,7 @@ class Compiler:
         builder = ProgramBuilder()
         unbrushed, no_film = (0.0, 0.0, none), (0.0, 1.33)
         below = builder.op("specular_layer", 1.0, none, 0.5, 1.5, 0.5, white, *unbrushed, *no_film, imm=(MULTI_GGX,))
-        builder.op("base_layer", below, none, grey, 0.0, 0.0, 0.0, 0.0)
+        builder.op("base_layer", below, none, grey, 0.0, 0.0, 0.0, 0.0, white, *(0.0,) * 5, imm=(0,))
         return builder.finish("default material")
 
     def _plain(self, name: str, color: tuple) -> Program:

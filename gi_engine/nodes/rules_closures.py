@@ -1,7 +1,7 @@
 """Rules of the shader nodes: what they add to the surface, as closure ops. No bpy.
 
 Normal and Coat Normal that are not linked are the zero vector, which the ops take for the shading normal. What is not
-rendered (subsurface scattering, hair, volumes, ray portals) has its fallback and warning here.
+rendered (hair, volumes, ray portals) has its fallback and warning here.
 """
 
 from __future__ import annotations
@@ -198,12 +198,11 @@ def principled(b, weight):
         "specular_layer", below, normal(b), roughness, ior, b.input("Specular IOR Level"), tint, *brushed, *coating,
         imm=distribution,
     )  # fmt: skip
-    subsurface = b.input("Subsurface Weight")
-    if not is_zero(b, subsurface) and number(b, thin_wall) in (None, 0.0):
-        b.warn("subsurface scattering is not rendered yet; it is diffuse of the same albedo")
+    weight = b.input("Subsurface Weight")
     b.op(
-        "base_layer", below, normal(b), color, b.input("Diffuse Roughness"), subsurface, b.input("Subsurface Anisotropy"),
-        thin_wall,
+        "base_layer", below, normal(b), color, b.input("Diffuse Roughness"), weight, b.input("Subsurface Anisotropy"), thin_wall,
+        b.input("Subsurface Radius"), b.input("Subsurface Scale"), roughness, ior, b.input("Specular IOR Level"),
+        b.input("Subsurface IOR"), imm=(subsurface_method(b, "subsurface_method", not is_zero(b, weight)),),
     )  # fmt: skip
 
 
@@ -246,13 +245,29 @@ def principled_emission(b, weight, below) -> None:
         b.op("emission", 1.0, b.op("vector_multiply", color, below), strength)
 
 
-# -------------------------------------------------------------------- fallbacks
+# -------------------------------------------------------------------- below the surface
+
+WALK, WALK_LEGACY, WALK_SKIN = range(3)
+
+
+def subsurface_method(b, name: str, shows: bool = True) -> int:
+    """What the node's method is walked as. The random walk of files from before "legacy" was told apart is the legacy one."""
+    method = getattr(b.node, name)
+    if method == "BURLEY" and shows:
+        b.warn("Christensen-Burley is rendered as a random walk of the same radius")
+    known = b.node.bl_rna.properties[name].enum_items.keys()
+    legacy = WALK_LEGACY if "RANDOM_WALK_LEGACY" not in known else WALK
+    return {"RANDOM_WALK": legacy, "RANDOM_WALK_SKIN": WALK_SKIN}.get(method, WALK_LEGACY)
 
 
 @closure_rule("ShaderNodeSubsurfaceScattering")
 def subsurface(b, weight):
-    b.warn("subsurface scattering is not rendered yet; it is diffuse of the same albedo")
-    b.op("diffuse", weight, b.input("Color"), 0.0, normal(b))
+    inputs = [b.input(name) for name in ("Color", "Scale", "Radius", "IOR")]
+    entry = b.input("Roughness", default=1.0), b.input("Anisotropy")
+    b.op("subsurface", weight, *inputs, *entry, normal(b), imm=(subsurface_method(b, "falloff"),))
+
+
+# -------------------------------------------------------------------- fallbacks
 
 
 @closure_rule("ShaderNodeBsdfHair")

@@ -12,7 +12,6 @@ from gi_engine.nodes.rules import CLOSURE_RULES
 from gi_engine.scene_data import Scene
 
 COMPOUND = {"ShaderNodeGroup", "ShaderNodeCustomGroup"}
-SUBSURFACE = {"Subsurface Radius", "Subsurface Scale", "Subsurface IOR"}
 
 
 class Shader:
@@ -107,7 +106,7 @@ def test_all_inputs_of_the_principled_bsdf_are_read(shader, monkeypatch):
     shows = ("Metallic", "Transmission Weight", "Coat Weight", "Sheen Weight", "Anisotropic", "Emission Strength")
     node = shader.new("ShaderNodeBsdfPrincipled", dict.fromkeys(shows, 0.5))
     shader.compile(node)
-    assert {s.name for s in node.inputs} - read == SUBSURFACE | {"Weight"}
+    assert {s.name for s in node.inputs} - read == {"Weight"}
 
 
 def test_principled_emits_and_lets_through_only_what_it_must(shader):
@@ -186,7 +185,6 @@ def test_groups_and_muted_shaders(shader):
 @pytest.mark.parametrize(
     ("idname", "ops"),
     [
-        ("ShaderNodeSubsurfaceScattering", ["diffuse"]),
         ("ShaderNodeBsdfHair", ["diffuse"]),
         ("ShaderNodeBsdfHairPrincipled", ["diffuse"]),
         ("ShaderNodeBsdfRayPortal", ["transparent"]),
@@ -204,10 +202,10 @@ def test_fallbacks_say_so_once(shader, idname, ops):
     assert "'Odd one'" in shader.warnings[0]
 
 
-def test_subsurface_of_the_principled_bsdf_says_so(shader):
+def test_subsurface_is_walked(shader):
+    assert shader.ops(shader.new("ShaderNodeSubsurfaceScattering")) == ["subsurface"]
     shader.compile(shader.new("ShaderNodeBsdfPrincipled", {"Subsurface Weight": 0.3}))
-    assert len(shader.warnings) == 1
-    assert "subsurface" in shader.warnings[0]
+    assert not shader.warnings
 
 
 @pytest.mark.skipif(bpy.app.version < (5, 2, 0), reason="thin walls came with 5.2")

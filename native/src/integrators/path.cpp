@@ -2,12 +2,15 @@
 // Each bounce: continue with probability α; draw ω from P; weigh by ρbd cos θ / (P(ω) α); add Le where a luminaire is met.
 #include "integrators/integrator.h"
 #include "transport/camera_path.h"
+#include "transport/subsurface.h"
 
 namespace gi {
 namespace {
 
 enum class DirectionSampling { kUniform, kCosine, kBsdf };
 enum class Continuation { kAlbedo, kThroughput, kConstant };
+
+constexpr uint32_t kBelow = 0x50b5u;  // random numbers of walks below surfaces
 
 struct PathSettings {
   LightSampling light_sampling;
@@ -80,6 +83,7 @@ class PathIntegrator final : public Integrator {
   void trace(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler, PixelSample& result) const {
     const LightSampling mode = s_.light_sampling;
     Bsdf bsdf;
+    bsdf.carry_subsurface(!context.lightmap);
     CameraPath path(camera);
     bool may_scatter = true;  // false past the bounce limit: the next surface only emits
 
@@ -108,7 +112,7 @@ class PathIntegrator final : public Integrator {
         }
       }
 
-      const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
+      ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
       // The less likely the path, the less sharp what it sees: as Blender's Filter Glossy does it.
       if (path.state.least_pdf < s_.filter_glossy) bsdf.blur(0.5f * std::sqrt(1.0f - path.state.least_pdf / s_.filter_glossy));
 
@@ -118,21 +122,38 @@ class PathIntegrator final : public Integrator {
       add(emitted, path.state.depth);
       const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
       const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
+      const auto pdf_of = [&](Vec3 wi, const LobeEval& e) {
+        return s_.direction_sampling == DirectionSampling::kBsdf ? e.pdf_dir : pdf_direction(bsdf, point, s_.direction_sampling, wi);
+      };
       if (may_scatter) {
-        const auto pdf_of = [&](Vec3 wi, const LobeEval& e) {
-          return s_.direction_sampling == DirectionSampling::kBsdf ? e.pdf_dir : pdf_direction(bsdf, point, s_.direction_sampling, wi);
-        };
         add(sample_direct_light(context, point, bsdf, mode, u_light_choice, u_light, pdf_of), path.state.depth + 1);
       }
 
       // Draw the next direction.
-      const auto next = sample_direction(bsdf, point, s_.direction_sampling, u, u_lobe);
+      auto next = sample_direction(bsdf, point, s_.direction_sampling, u, u_lobe);
       if (!next || !(next->pdf_dir > 0.0f)) break;
       const bool transparent = next->flags & kTransparent;
       if (!may_scatter && !transparent) break;
-      const Rgb weight = next->value / next->pdf_dir;
+      Rgb weight = next->value / next->pdf_dir;
       path.throughput *= weight;
       if (is_black(path.throughput)) break;
+
+      // Light that goes below the surface comes out elsewhere, diffusely: that is where lights are looked for, and the next direction.
+      if (next->flags & kSubsurface) {
+        Sampler below = sampler.fork(bounce + kBelow);
+        const auto exit = walk_below(context.scene, point, bsdf.subsurface(next->subsurface), below.fork(kBelow));
+        if (!exit) break;
+        path.throughput *= exit->weight;
+        weight *= exit->weight;
+        point = exit->point;
+        set_exit(*exit, bsdf);
+        const float u_choice = below.next_1d(), u_exit = below.next_1d();
+        const Vec2 u_to_light = below.next_2d(), u_out = below.next_2d();
+        add(sample_direct_light(context, point, bsdf, mode, u_choice, u_to_light, pdf_of), path.state.depth + 1);
+        next = sample_direction(bsdf, point, s_.direction_sampling, u_out, u_exit);
+        if (!next || !(next->pdf_dir > 0.0f)) break;
+        path.throughput *= next->value / next->pdf_dir;
+      }
 
       // Follow it. A transparent surface changes nothing but the throughput: the ray goes on as the one it was.
       path.travelled += hit->t;

@@ -67,10 +67,25 @@ Bsdf::Entry* Bsdf::new_entry(Rgb weight, uint8_t flags, const Frame& frame) {
   return &e;
 }
 
+void Bsdf::add_subsurface(const Subsurface& given) {
+  constexpr float kLeastRadius = 1e-8f;  // metres
+  Subsurface s = given;
+  s.anisotropy = std::clamp(s.anisotropy, -0.99f, s.method == SubsurfaceMethod::kWalk ? 0.99f : 0.9f);
+  s.ior = std::clamp(s.ior, 1.01f, 3.8f), s.weight = positive(s.weight), s.radius = positive(s.radius), s.albedo = positive(s.albedo);
+  Rgb diffuse;
+  for (int i = 0; i < 3; ++i)
+    if (!(s.radius[i] >= kLeastRadius)) diffuse[i] = s.weight[i], s.weight[i] = 0.0f;
+  const Rgb white(1.0f);
+  if (!is_black(diffuse)) add(diffuse, Lambert{}, Frame::from_normal(s.normal), &white);
+  if (!(average(s.weight) >= kLeastWeight) || !is_finite(s.weight) || subsurface_count_ == kMaxSubsurface) return;
+  subsurface_[subsurface_count_++] = s;
+}
+
 void Bsdf::finish(Vec3 wo) {
   float sum = std::max(average(transparency), 0.0f);
+  for (int i = 0; i < subsurface_count_; ++i) sum += subsurface_[i].select = average(subsurface_[i].weight), flags_ |= kSubsurface;
   const bool single = count_ == 1 && sum == 0.0f;
-  select_transparent_ = sum;
+  select_transparent_ = std::max(average(transparency), 0.0f);
   for (int i = 0; i < count_; ++i) {
     Entry& e = entries_[i];
     if (e.albedo < 0.0f && !single) e.albedo = average(e.weight * albedo_of(e.lobe, e.frame.to_local(wo)));
@@ -81,10 +96,11 @@ void Bsdf::finish(Vec3 wo) {
   const float scale = sum > 0.0f ? 1.0f / sum : 0.0f;
   select_transparent_ *= scale;
   for (int i = 0; i < count_; ++i) entries_[i].select *= scale;
+  for (int i = 0; i < subsurface_count_; ++i) subsurface_[i].select *= scale;
 }
 
 void Bsdf::blur(float alpha) {
-  flags_ &= kTransparent;
+  flags_ &= kTransparent | kSubsurface;
   for (int i = 0; i < count_; ++i) {
     Entry& e = entries_[i];
     blur_lobe(e.lobe, alpha);
@@ -111,7 +127,7 @@ void Bsdf::choose(uint8_t kinds, Vec3 wo) {
 }
 
 void Bsdf::hold_out() {
-  count_ = 0;
+  count_ = subsurface_count_ = 0;
   emission = Rgb(), holdout = Rgb(1.0f) - transparency;
   flags_ &= kTransparent;
   select_transparent_ = flags_ ? 1.0f : 0.0f;
@@ -163,6 +179,11 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, Vec2 u, float u_lobe) const {
     if (left < e.select) return sample_entry(e, wo, u, std::min(left / e.select, kOneMinusEpsilon));
     left -= e.select;
   }
+  for (int i = 0; i < subsurface_count_; ++i) {
+    const Subsurface& s = subsurface_[i];
+    if (left < s.select) return BsdfSample{{}, s.weight, s.select, kSubsurface, 1.0f, int8_t(i)};
+    left -= s.select;
+  }
   if (select_transparent_ > 0.0f) return BsdfSample{-wo, transparency, select_transparent_, kTransparent, 0.0f};
   // Rounding left a little over: it belongs to the last lobe that can be chosen.
   for (int i = count_ - 1; i >= 0; --i)
@@ -196,6 +217,7 @@ float Bsdf::delta_probability() const {
   float sum = select_transparent_;
   for (const Entry& e : *this)
     if (e.flags & kSpecular) sum += e.select;
+  for (int i = 0; i < subsurface_count_; ++i) sum += subsurface_[i].select;
   return sum;
 }
 
@@ -205,6 +227,11 @@ std::optional<BsdfSample> Bsdf::sample_delta(Vec3 wo, float u_lobe) const {
     if (!(e.flags & kSpecular)) continue;
     if (left < e.select) return sample_entry(e, wo, {0.5f, 0.5f}, std::min(left / e.select, kOneMinusEpsilon));
     left -= e.select;
+  }
+  for (int i = 0; i < subsurface_count_; ++i) {
+    const Subsurface& s = subsurface_[i];
+    if (left < s.select) return BsdfSample{{}, s.weight, s.select, kSubsurface, 1.0f, int8_t(i)};
+    left -= s.select;
   }
   if (select_transparent_ > 0.0f) return BsdfSample{-wo, transparency, select_transparent_, kTransparent, 0.0f};
   return {};
@@ -233,6 +260,8 @@ Rgb Bsdf::albedo(Vec3 wo, uint8_t flags) const {
   Rgb sum;
   for (const Entry& e : *this)
     if (e.flags & flags & kKinds) sum += e.weight * albedo_of(e.lobe, e.frame.to_local(wo));
+  if (flags & kDiffuse)
+    for (int i = 0; i < subsurface_count_; ++i) sum += subsurface_[i].weight;
   return sum;
 }
 
@@ -260,6 +289,7 @@ Vec3 Bsdf::diffuse_normal() const {
 Vec3 Bsdf::mean_normal() const {
   Vec3 sum;
   for (const Entry& e : *this) sum += e.frame.z * e.select;
+  for (int i = 0; i < subsurface_count_; ++i) sum += subsurface_[i].normal * subsurface_[i].select;
   return normalize_or(sum, ns_);
 }
 

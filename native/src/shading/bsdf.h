@@ -7,6 +7,7 @@
 
 #include "core/vec.h"
 #include "shading/lobes/lobes.h"
+#include "shading/subsurface.h"
 
 namespace gi {
 
@@ -17,7 +18,8 @@ struct BsdfSample {
   float pdf_dir = 0; // of the whole mix, lobe choice included; for delta lobes the probability of the choice
   uint8_t flags = 0; // of the lobe that was sampled: side and kind; kTransparent alone for straight through
   float roughness = 0;  // of the sampled lobe, for the footprint and for caustic filtering
-  bool is_delta() const { return flags & (kSpecular | kTransparent); }
+  int8_t subsurface = -1;  // which, where the flags say kSubsurface: wi is then not set
+  bool is_delta() const { return flags & (kSpecular | kTransparent | kSubsurface); }
 };
 
 // Reuse one object: 24 lobes are some kilobytes, and clear() touches none of them.
@@ -28,7 +30,8 @@ class Bsdf {
   Bsdf() {}  // entries_ stay uninitialised
   // `without`: CausticFlags, sides of glossy lobes to leave out.
   void clear(Vec3 ng, Vec3 ns, uint8_t without = 0) {
-    count_ = 0, flags_ = 0, chosen_ = kAll, ng_ = ng, ns_ = ns, without_ = without, emission = Rgb(), transparency = Rgb(), holdout = Rgb();
+    count_ = 0, subsurface_count_ = 0, flags_ = 0, chosen_ = kAll, ng_ = ng, ns_ = ns, without_ = without, emission = Rgb(),
+    transparency = Rgb(), holdout = Rgb();
   }
   uint8_t without() const { return without_; }
   void set_geometric_normal(Vec3 ng) { ng_ = ng; }
@@ -38,6 +41,14 @@ class Bsdf {
   // Blender's Bump Map Correction: bent normals neither reflect what is below the surface nor make hard terminators. Survives clear().
   void set_bump_correction(bool on) { correct_bumps_ = on; }
   bool bump_correction() const { return correct_bumps_; }
+
+  // Whether the integrator follows light below the surface; if not, it is diffuse of the same albedo. Survives clear().
+  void carry_subsurface(bool on) { carries_subsurface_ = on; }
+  bool carries_subsurface() const { return carries_subsurface_; }
+  // Where it is carried. Channels of no radius are diffuse.
+  void add_subsurface(const Subsurface& s);
+  const Subsurface& subsurface(int i) const { return subsurface_[i]; }
+  int subsurface_count() const { return subsurface_count_; }
 
   // Adds `lobe` in the frame whose z is the lobe's own (bumped) normal. Negative components count as 0; weights that come to
   // nothing are dropped, and so are lobes beyond kMaxLobes.
@@ -115,9 +126,15 @@ class Bsdf {
   LobeEval eval_if(Vec3 wo, Vec3 wi, const Entry* skipped, Accept accept) const;
   std::optional<BsdfSample> sample_entry(const Entry& e, Vec3 wo, Vec2 u, float u_lobe) const;
 
+  static constexpr int kMaxSubsurface = 4;
   union {
     Entry entries_[kMaxLobes];
   };
+  union {
+    Subsurface subsurface_[kMaxSubsurface];
+  };
+  int subsurface_count_ = 0;
+  bool carries_subsurface_ = false;
   static constexpr uint8_t kAll = kDiffuse | kGlossy | kSpecular | kTransparent;
   int count_ = 0;
   uint8_t flags_ = 0, without_ = 0, chosen_ = kAll;

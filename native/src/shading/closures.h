@@ -49,6 +49,12 @@ inline Anisotropy anisotropy(float roughness, float amount, float rotation, Vec3
   return {alpha / aspect, alpha * aspect, rotated(tangent, n, rotation * 2.0f * kPi)};
 }
 
+// `s.weight` has the albedo in it. Where light is not followed below the surface it is diffuse.
+inline void add_subsurface(ShadeState& state, const Subsurface& s, Vec3 n) {
+  if (!state.bsdf->carries_subsurface()) return add_diffuse(state, s.weight, s.albedo, 0.0f, n);
+  state.bsdf->add_subsurface(s);
+}
+
 // The weight left for what lies under a layer that reflects `albedo` (its own weight included) out of `weight`: the channel
 // that reflects most decides, so that no hue is made by layering.
 inline Rgb under_layer(Rgb weight, Rgb albedo) {

@@ -32,6 +32,18 @@ void diffuse(const Operands& o, ShadeState& s) {
   if (s.bsdf) add_diffuse(s, o.c(1) * o.f(0), o.c(1), o.f(2), normal_or_shading(s, o.v(3)));
 }
 
+// weight, color, scale, radius, ior, roughness, anisotropy, normal; method
+void subsurface(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  const Vec3 n = normal_or_shading(s, o.v(7));
+  Subsurface below;
+  below.albedo = positive(o.c(1)), below.weight = o.c(1) * o.f(0), below.radius = o.c(3) * o.f(2);
+  below.ior = o.f(4), below.alpha = clamp01(o.f(5)), below.anisotropy = o.f(6), below.normal = visible_normal(s, n);
+  below.method = SubsurfaceMethod(o.imm(8));
+  if (below.method == SubsurfaceMethod::kSkin) below.alpha = 1.0f;
+  add_subsurface(s, below, n);
+}
+
 void translucent(const Operands& o, ShadeState& s) {
   if (!s.bsdf) return;
   add_lobe(s, o.c(1) * o.f(0), Translucent{}, visible_normal(s, normal_or_shading(s, o.v(2))));
@@ -117,6 +129,7 @@ const Op kOps[] = {
     {"alpha", "", "ff", 0, OpKind::kClosure, alpha, kAddsTransparency},
     {"holdout", "", "f", 0, OpKind::kClosure, holdout, kAddsLobe},
     {"diffuse", "", "fvfv", 0, OpKind::kClosure, diffuse, kAddsLobe},
+    {"subsurface", "", "fvfvfffv", 1, OpKind::kClosure, subsurface, kAddsLobe},
     {"translucent", "", "fvv", 0, OpKind::kClosure, translucent, kAddsLobe},
     {"sheen", "", "fvfv", 0, OpKind::kClosure, sheen, kAddsLobe},
     {"velvet", "", "fvfv", 0, OpKind::kClosure, velvet, kAddsLobe},

@@ -1,6 +1,6 @@
 // The Principled BSDF of Blender 5.2 as layers, one op each, from the top down: sheen, coat, metal, glass, specular, base. Each adds
 // its lobes and gives the weight that it leaves for what lies below. Models are those of Blender's manual, weights follow Cycles'
-// closures. Leaves out subsurface scattering: its share is diffuse with the same albedo (transmitting, too, where the wall is thin).
+// closures. Where the wall is thin, light below the surface is diffuse on both sides.
 #include "shading/closures.h"
 #include "shading/ops.h"
 
@@ -150,16 +150,19 @@ Rgb glass_layer(Reader r, ShadeState& s) {
   return weight * (1.0f - amount);
 }
 
+// The index of refraction that has `level` twice times the reflectance of `ior`.
+float specular_index(float ior, float level) {
+  if (level == 0.5f) return ior;
+  const float eta = ior_from_f0(f0_from_ior(ior) * 2.0f * level);
+  return ior < 1.0f ? 1.0f / eta : eta;
+}
+
 Rgb specular_layer(Reader r, ShadeState& s) {
   const Rgb weight = r.c();
   if (!reflects(s)) return weight;
   const Vec3 normal = normal_or_shading(s, r.v());
   const float roughness = r.unit(), ior = r.at_least(1e-5f), level = r.at_least(0.0f);
-  float f0 = f0_from_ior(ior), eta = ior;
-  if (level != 0.5f) {
-    f0 *= 2.0f * level;
-    eta = ior < 1.0f ? 1.0f / ior_from_f0(f0) : ior_from_f0(f0);
-  }
+  const float f0 = f0_from_ior(ior) * (level != 0.5f ? 2.0f * level : 1.0f), eta = specular_index(ior, level);
   const Rgb tint = r.color();
   const float anisotropic = r.unit(), rotation = r.f();
   const Anisotropy a = anisotropy(roughness, anisotropic, rotation, normal, r.v());
@@ -186,7 +189,17 @@ void base_layer(Reader r, ShadeState& s) {
       else
         add_lobe(s, subsurface * forward, OrenNayar(c, roughness, true), n);
     } else {
-      add_diffuse(s, subsurface, c, 0.0f, n);
+      Subsurface below;
+      below.weight = subsurface, below.albedo = c, below.anisotropy = anisotropy, below.normal = visible_normal(s, n);
+      below.radius = r.color();
+      below.radius *= r.at_least(0.0f);
+      below.alpha = sqr(r.unit());
+      const float ior = r.at_least(1e-5f), level = r.at_least(0.0f), skin_ior = r.f();
+      below.method = SubsurfaceMethod(r.o.imm(r.i));
+      const bool skin = below.method == SubsurfaceMethod::kSkin;
+      below.ior = skin ? skin_ior : specular_index(ior, level);
+      if (skin) below.alpha = 1.0f;
+      add_subsurface(s, below, n);
     }
   }
   add_diffuse(s, color * weight * (1.0f - amount), color, roughness, n);
@@ -209,8 +222,8 @@ const Op kOps[] = {
     {"glass_layer", "v", "vvfvvfffff", 1, OpKind::kClosure, layer<glass_layer>, kAddsLobe | kSeesPoint},
     // roughness, ior, level, tint, anisotropic, rotation, tangent, film thickness, film ior; distribution
     {"specular_layer", "v", "vvfffvffvff", 1, OpKind::kClosure, layer<specular_layer>, kAddsLobe | kSeesPoint},
-    // color, roughness, subsurface, its anisotropy, thin
-    {"base_layer", "", "vvvffff", 0, OpKind::kClosure,
+    // color, roughness, subsurface, its anisotropy, thin, radius, scale, surface roughness, ior, level, ior of skin; method
+    {"base_layer", "", "vvvffffvfffff", 1, OpKind::kClosure,
      [](const Operands& o, ShadeState& s) {
        if (s.bsdf && !is_black(o.c(0))) base_layer(Reader{o, 0}, s);
      },

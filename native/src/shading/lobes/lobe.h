@@ -22,6 +22,7 @@ enum LobeFlags : uint8_t {
   kGlossy = 8,
   kSpecular = 16,     // delta in direction
   kTransparent = 32,  // straight through, does not count as a bounce
+  kSubsurface = 64,   // into the surface, to come out elsewhere: only where an integrator carries it
 };
 
 struct LobeEval {
