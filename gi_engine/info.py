@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 
+from .approximations import heading
 from .scene_data import Scene, Settings
 from .session import Session
 
@@ -21,6 +22,7 @@ def describe(scene: Scene, settings: Settings) -> list[str]:
         triangles(scene),
         f"lights: {lights(scene)}",
         f"materials: {listed(materials(scene))}",
+        *approximated(scene),
         f"images: {listed([tiles[0].name for tiles in scene.images if tiles])}",
     ]
     session = Session(scene, settings)
@@ -68,6 +70,11 @@ def lights(scene: Scene) -> str:
     if scene.world.program >= 0:
         parts.append(f"world {named(scene.programs[scene.world.program].name)}")
     return ", ".join(parts) or "none but what materials emit"
+
+
+def approximated(scene: Scene) -> list[str]:
+    """A line for each material (or lamp, or world) with nodes that are rendered as something else."""
+    return [f"{named(p.name)}: {heading(p.approximated)}" for p in scene.programs if p.approximated]
 
 
 def materials(scene: Scene) -> list[str]:

@@ -132,6 +132,8 @@ class Program:
     emission_sampling: str = "AUTO"  # NONE, AUTO, FRONT, BACK, FRONT_BACK: how its triangles are picked as lights
     transparent_shadows: bool = True
     bump_correction: bool = True  # Cycles' Bump Map Correction
+    needs: list[str] = field(default_factory=list)  # what an integrator has to carry: "subsurface", "volumes"
+    approximated: list[str] = field(default_factory=list)  # what is rendered as something else, one text for each node
 
 
 @dataclass

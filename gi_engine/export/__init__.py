@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import approximations
 from ..scene_data import Camera, Scene, Settings
 from .camera import export_camera
 from .film import export_film, frame_size
@@ -21,6 +22,12 @@ from .settings import export_settings, resolve
 from .shaders import Shaders
 from .warnings import Warnings
 from .world import export_world
+
+# What integrators make of what they do not carry.
+WITHOUT = {
+    "subsurface": "does not follow light below surfaces: subsurface scattering is diffuse of the same albedo",
+    "volumes": "does not render volumes: they are left out",
+}
 
 
 @dataclass
@@ -62,7 +69,18 @@ def export(
         warnings.add("motion blur is not supported yet; rendered without")
     release_scratch()
     settings = export_settings(scene, view_layer, descriptors, integrator)
+    warn_of_needs(out, settings.integrator, descriptors, warnings)
+    approximations.note(out.programs)
     return Exported(out, settings, warnings.messages())
+
+
+def warn_of_needs(out: Scene, integrator: str, descriptors: list[dict], warnings: Warnings) -> None:
+    """One warning for each thing that materials have and the integrator does not carry."""
+    chosen = next((d for d in descriptors if d["id"] == integrator), {})
+    for program in out.programs:
+        for need in program.needs:
+            if need not in chosen.get("carries", ()):
+                warnings.add(f"{chosen.get('label', integrator)} {WITHOUT[need]}", program.name)
 
 
 def export_active_camera(engine, depsgraph, width: int, height: int, warnings: Warnings):

@@ -30,6 +30,7 @@ NOT_FOR_CYCLES = {
     "ShaderNodeSqueeze": "is from before Blender 2.8",
     "ShaderNodeScript": "needs Open Shading Language",
 }
+AS_CYCLES = "as in Cycles"
 NUMBERED = re.compile(r"^\d+_")
 DEEPEST = 20000  # Python's recursion limit while a tree is compiled: some frames for each node of a chain
 
@@ -119,7 +120,7 @@ class Compiler:
         program.emission_sampling = getattr(settings, "emission_sampling", "AUTO")
         program.transparent_shadows = getattr(material, "use_transparent_shadow", True)
         program.bump_correction = getattr(getattr(material, "cycles", None), "use_bump_map_correction", True)
-        return program
+        return walker.noted(program)
 
     def light(self, light) -> Program:
         """The emission of a lamp's node tree, to be multiplied with the lamp's own."""
@@ -139,7 +140,7 @@ class Compiler:
             walker.warn_of_volume(Context(walker.tree), output)
             with deep_recursion():
                 walker.closure_input(Context(walker.tree), output.inputs["Surface"], walker.builder.constant(1.0))
-        return walker.builder.finish(owner.name)
+        return walker.noted(walker.builder.finish(owner.name))
 
     def _default_material(self) -> Program:
         """What Cycles gives to objects without a material: a fresh Principled BSDF from 5.0 on, diffuse before."""
@@ -170,6 +171,8 @@ class TreeWalker:
         self.builder = ProgramBuilder()
         self.outputs: list[dict] = [{}]  # outputs of nodes by (context, node), innermost scope last
         self.active: list[tuple] = []  # nodes being compiled, to find cycles
+        self.needs: set[str] = set()  # what an integrator has to carry
+        self.approximated: dict[str, str] = {}  # what is rendered as something else, by node
 
     def surface(self, material, tree) -> None:
         context = Context(tree)
@@ -185,6 +188,17 @@ class TreeWalker:
             NodeBuilder(self, context, output).bump_displacement()
         self.warn_of_volume(context, output)
         self.closure_input(context, output.inputs["Surface"], self.builder.constant(1.0))
+
+    def noted(self, program: Program) -> Program:
+        program.needs, program.approximated = sorted(self.needs), list(self.approximated.values())
+        return program
+
+    def approximate(self, node, text: str) -> None:
+        """One warning for the user that names the owner and the node."""
+        named = f"node '{self.name_of(node)}' ({node.bl_label}): {text}"
+        if not text.endswith(AS_CYCLES):
+            self.approximated.setdefault(self.name_of(node), named)
+        self.compiler.warn(f"{self.who}: {named}")
 
     def name_of(self, node) -> str:
         """As the user knows the node: inlining puts a number before the names of all but outputs."""
@@ -237,9 +251,7 @@ class TreeWalker:
                 context = context.parent
             elif node.bl_idname in NOT_FOR_CYCLES:
                 why = NOT_FOR_CYCLES[node.bl_idname]
-                self.compiler.warn(
-                    f"{self.who}: node '{self.name_of(node)}' ({node.bl_label}) {why}; it is as if not linked, as in Cycles"
-                )
+                self.approximate(node, f"{why}; it is as if not linked, {AS_CYCLES}")
                 return unlinked
             else:
                 return Source(context, node, output, tuple(through))
@@ -297,9 +309,7 @@ class TreeWalker:
         made = NodeBuilder(self, context, node)
         rule = RULES.get(node.bl_idname)
         if rule is None:
-            self.compiler.warn(
-                f"{self.who}: node '{self.name_of(node)}' ({node.bl_label}) is not supported; it gives its default"
-            )
+            self.approximate(node, "not supported; it gives its default")
             made.pass_defaults()
         else:
             self.active.append(key)
@@ -321,9 +331,7 @@ class TreeWalker:
         rule = CLOSURE_RULES.get(node.bl_idname)
         key = (source.context.key, node.as_pointer())
         if rule is None:
-            self.compiler.warn(
-                f"{self.who}: shader '{self.name_of(node)}' ({node.bl_label}) is not supported; it renders black"
-            )
+            self.approximate(node, "not supported; it renders black")
         elif key in self.active:
             self.compiler.warn(f"{self.who}: node '{self.name_of(node)}' is part of a cycle and is left out there")
         else:

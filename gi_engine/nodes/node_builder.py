@@ -85,7 +85,11 @@ class NodeBuilder:
 
     def warn(self, text: str) -> None:
         """One warning for the user, naming the material and this node."""
-        self.compiler.warn(f"{self.walker.who}: node '{self.walker.name_of(self.node)}' ({self.node.bl_label}): {text}")
+        self.walker.approximate(self.node, text)
+
+    def need(self, what: str) -> None:
+        """Says that it takes an integrator that carries `what` ("subsurface", "volumes")."""
+        self.walker.needs.add(what)
 
     def pass_defaults(self) -> None:
         """An unsupported node gives the value of its outputs' own defaults."""

@@ -253,6 +253,8 @@ WALK, WALK_LEGACY, WALK_SKIN = range(3)
 def subsurface_method(b, name: str, shows: bool = True) -> int:
     """What the node's method is walked as. The random walk of files from before "legacy" was told apart is the legacy one."""
     method = getattr(b.node, name)
+    if shows:
+        b.need("subsurface")
     if method == "BURLEY" and shows:
         b.warn("Christensen-Burley is rendered as a random walk of the same radius")
     known = b.node.bl_rna.properties[name].enum_items.keys()
@@ -293,7 +295,7 @@ def ray_portal(b, weight):
 
 @closure_rule("ShaderNodeEeveeSpecular")
 def eevee_specular(b, weight):
-    b.warn("is a node for EEVEE alone; it renders black, as in Cycles")
+    b.warn("for EEVEE alone; it renders black, as in Cycles")
 
 
 @closure_rule(

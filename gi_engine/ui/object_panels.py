@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import bpy
 
+from .. import approximations
 from ..export.shaders import has_nodes
 from .panel import Panel, columns
 
@@ -133,6 +134,36 @@ class GI_MATERIAL_PT_displacement(MaterialPanel, bpy.types.Panel):
         draw_nodes(self.layout, context.material, "Displacement")
 
 
+class GI_MATERIAL_PT_volume(MaterialPanel, bpy.types.Panel):
+    bl_label = "Volume"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and has_nodes(context.material)
+
+    def draw(self, context):
+        draw_nodes(self.layout, context.material, "Volume")
+
+
+class GI_MATERIAL_PT_approximated(MaterialPanel, bpy.types.Panel):
+    """What the last render or preview said of the material's nodes."""
+
+    bl_label = ""
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and bool(approximations.of(context.material.name))
+
+    def draw_header(self, context):
+        self.layout.label(text=approximations.heading(approximations.of(context.material.name)), icon="INFO")
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        for text in approximations.of(context.material.name):
+            column.label(text=text)
+
+
 class WorldPanel(Panel):
     bl_context = "world"
 
@@ -251,6 +282,8 @@ CLASSES = (
     GI_LIGHT_PT_nodes,
     GI_MATERIAL_PT_surface,
     GI_MATERIAL_PT_displacement,
+    GI_MATERIAL_PT_volume,
+    GI_MATERIAL_PT_approximated,
     GI_MATERIAL_PT_settings,
     GI_OBJECT_PT_visibility,
     GI_WORLD_PT_preview,

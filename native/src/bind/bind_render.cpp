@@ -142,6 +142,10 @@ nb::list describe_integrators() {
     nb::dict entry;
     entry["id"] = d.id, entry["label"] = d.label, entry["blurb"] = d.blurb, entry["parameters"] = parameters, entry["bakes"] = d.bakes;
     entry["kept_version"] = d.kept_version, entry["kept_by_place"] = d.kept_by_place;
+    nb::list carries;
+    if (d.carries & kCarriesSubsurface) carries.append("subsurface");
+    if (d.carries & kCarriesVolumes) carries.append("volumes");
+    entry["carries"] = carries;
     all.append(entry);
   }
   return all;

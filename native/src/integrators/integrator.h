@@ -66,6 +66,9 @@ class Integrator {
   virtual Kept keep() const { return {}; }
 };
 
+// What paths may meet besides surfaces that scatter where they are met. Of the rest an integrator makes the surface's own fallback.
+enum Carries : uint8_t { kCarriesSubsurface = 1, kCarriesVolumes = 2 };
+
 struct Descriptor {
   const char* id;
   const char* label;
@@ -77,6 +80,7 @@ struct Descriptor {
   // By place: their rows begin with a position and a normal, so that those near what has changed can be left out.
   int kept_version = 0;
   bool kept_by_place = false;
+  uint8_t carries = 0;  // Carries
 };
 
 const std::vector<Descriptor>& integrators();

@@ -248,7 +248,10 @@ const Descriptor& path_descriptor() {
            "Makes glossy surfaces rougher where unlikely paths see them: less noise, blurred caustics. 0 is off"},
       },
       [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<PathIntegrator>(p); },
-      true};
+      /*bakes=*/true,
+      /*kept_version=*/0,
+      /*kept_by_place=*/false,
+      kCarriesSubsurface};
   return descriptor;
 }
 

@@ -1,0 +1,50 @@
+"""The page of features is that of the integrators; renders warn of what theirs does not carry."""
+
+import bpy
+import pytest
+
+from gi_engine import approximations, native
+from gi_engine.export import export
+from gi_engine.info import approximated
+from tests.parity import features_report
+
+
+def test_page_is_up_to_date():
+    assert features_report.PAGE.read_text() == features_report.page(native.integrators())
+
+
+@pytest.fixture
+def skin():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    mesh = bpy.data.meshes.new("Triangle")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    scene.collection.objects.link(bpy.data.objects.new("Triangle", mesh))
+    material = bpy.data.materials.new("Skin")
+    material.use_nodes = True
+    mesh.materials.append(material)
+    return material
+
+
+def exported(integrator: str):
+    return export(bpy.context.evaluated_depsgraph_get(), native.integrators(), None, (8, 8), integrator)
+
+
+def test_integrators_say_what_they_do_not_carry(skin):
+    skin.node_tree.nodes["Principled BSDF"].inputs["Subsurface Weight"].default_value = 0.5
+    assert not [text for text in exported("path").warnings if "subsurface" in text]
+    (warning,) = [text for text in exported("whitted").warnings if "subsurface" in text]
+    assert '"Skin"' in warning
+
+
+def test_approximated_nodes_are_counted(skin):
+    tree = skin.node_tree
+    hair = tree.nodes.new("ShaderNodeBsdfRayPortal")
+    tree.links.new(hair.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    found = exported("path")
+    assert approximated(found.scene) == ['"Skin": 1 node approximated']
+    assert len(approximations.of("Skin")) == 1 and "Ray Portal" in approximations.of("Skin")[0]
+    tree.links.new(tree.nodes["Principled BSDF"].outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    exported("path")
+    assert not approximations.of("Skin")
