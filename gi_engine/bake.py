@@ -82,10 +82,13 @@ def unwrap(item, request: Request, whole_faces: bool) -> str:
             other.select_set(False)
         context.view_layer.objects.active = item
         item.select_set(True)
-        if whole_faces:
-            bpy.ops.uv.lightmap_pack(PREF_CONTEXT="ALL_FACES", PREF_MARGIN_DIV=min(1.0, 10 * gap))
-        else:
-            project(min(gap, 0.1))
+        with context.temp_override(
+            area=None, region=None
+        ):  # from within an image editor only what it has selected is unwrapped
+            if whole_faces:
+                bpy.ops.uv.lightmap_pack(PREF_CONTEXT="ALL_FACES", PREF_MARGIN_DIV=min(1.0, 10 * gap))
+            else:
+                project(min(gap, 0.1))
     except RuntimeError as error:
         raise BakeError(f'object "{item.name}" cannot be unwrapped: {str(error).strip()}') from error
     finally:

@@ -1,11 +1,13 @@
-"""Inside Blender with a window: F12 ends by itself and makes a picture, Esc ends what would take for ever, with every integrator.
-Real keys, by xdotool. Quits with exit status 0, or 1 after the first thing that went wrong."""
+"""Inside Blender with a window: F12 ends by itself and makes a picture, Esc ends what would take for ever, with every integrator; so do the
+buttons that bake and that render strategies. Real keys, by xdotool. Quits with exit status 0, or 1 after the first thing that went wrong."""
 
 import os
 import subprocess
 import sys
+import tempfile
 import time
 import traceback
+from pathlib import Path
 
 import bpy
 
@@ -48,6 +50,65 @@ def both_keys(own, chosen):
     assert ended == ["done", "stopped"], (chosen, ended)
 
 
+def in_window():
+    window = bpy.context.window_manager.windows[0]
+    area = max(window.screen.areas, key=lambda a: a.width * a.height)
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    return bpy.context.temp_override(window=window, area=area, region=region)
+
+
+def button(own, name, how, samples, **options):
+    """Presses it; by a button's own sign, what it started is at work when this returns."""
+    own.samples = samples
+    with in_window():
+        found = getattr(bpy.ops.gi_engine, name)(how, **options)
+    assert found == {"RUNNING_MODAL"}, (name, found)
+    assert is_working(name)
+    with in_window():
+        assert not getattr(bpy.ops.gi_engine, name).poll(), f"{name} can be pressed twice"
+
+
+def is_working(name):
+    return getattr(bpy.types, "GI_ENGINE_OT_" + name).running
+
+
+def cancelled(name):
+    yield 1.0
+    assert is_working(name)
+    start = time.monotonic()
+    press(ESCAPE)
+    yield from until(lambda: not is_working(name), 20, f"{name}, Esc")
+    print(f"window: {name}: stopped within {time.monotonic() - start:.1f} s", flush=True)
+
+
+def bake(own):
+    item = next(o for o in bpy.context.view_layer.objects if o.type == "MESH")
+    for other in bpy.context.view_layer.objects:
+        other.select_set(other == item)
+    own.integrator, own.lightmap.width, own.lightmap.height, own.lightmap.folder = "path", 32, 32, ""
+    before = {image.name for image in bpy.data.images}, item.data.uv_layers.keys()
+    button(own, "bake_lightmap", "INVOKE_DEFAULT", 1_000_000)
+    yield from cancelled("bake_lightmap")
+    assert ({image.name for image in bpy.data.images}, item.data.uv_layers.keys()) == before, "something is left behind"
+    button(own, "bake_lightmap", "INVOKE_DEFAULT", 2)
+    yield from until(lambda: not is_working("bake_lightmap"), 60, "bake_lightmap")
+    image = bpy.data.images[next(iter({image.name for image in bpy.data.images} - before[0]))]
+    assert any(image.pixels[:]), "the lightmap is black"
+    print(f"window: bake_lightmap: {image.name}", flush=True)
+
+
+def show_strategies(own):
+    own.integrator = "bdpt"
+    with tempfile.TemporaryDirectory() as folder:
+        button(own, "render_strategies", "EXEC_DEFAULT", 1_000_000, directory=folder)  # as the file browser calls it
+        yield from cancelled("render_strategies")
+        assert not list(Path(folder).iterdir()), "something is left behind"
+        button(own, "render_strategies", "EXEC_DEFAULT", 1, directory=folder)
+        yield from until(lambda: not is_working("render_strategies"), 90, "render_strategies")
+        assert (Path(folder) / "weighted.png").exists()
+        print(f"window: render_strategies: {len(list(Path(folder).iterdir()))} files", flush=True)
+
+
 def story():
     scene = bpy.context.scene
     bpy.context.preferences.view.render_display_type = "AREA"
@@ -59,6 +120,10 @@ def story():
     yield 2
     for item in scene.gi_engine.bl_rna.properties["integrator"].enum_items:
         yield from both_keys(scene.gi_engine, item.identifier)
+    yield from bake(scene.gi_engine)
+    yield from show_strategies(scene.gi_engine)
+    # And what was there before still works.
+    yield from both_keys(scene.gi_engine, "path")
 
 
 steps = story()
