@@ -326,6 +326,12 @@ def series_command(arguments, out, err) -> int:
     return series_command(arguments, out, err)
 
 
+def parity_command(arguments, out, err) -> int:
+    from .compare.commands import parity_command
+
+    return parity_command(arguments, out, err)
+
+
 COMMANDS = {
     "render": render_command,
     "bake": bake_command,
@@ -333,6 +339,7 @@ COMMANDS = {
     "integrators": integrators_command,
     "compare": compare_command,
     "series": series_command,
+    "parity": parity_command,
 }
 
 

@@ -35,7 +35,6 @@ def add_commands(commands, commands_by_name: dict, file: dict, types) -> list:
     compare.add_argument(
         "-o", "--output", type=Path, default=Path("report"), metavar="DIR", help="default: %(default)s"
     )
-    compare.add_argument("--machine-progress", action="store_true", help=argparse.SUPPRESS)
     compare.set_defaults(command=commands_by_name["compare"])
     series = commands.add_parser(
         "series", help="the classic figure: from ray tracing to global illumination, on one sheet"
@@ -45,7 +44,36 @@ def add_commands(commands, commands_by_name: dict, file: dict, types) -> list:
     series.add_argument("--frame", type=int, metavar="N", help="default: the scene's current frame")
     series.add_argument("-o", "--output", type=Path, default=Path("series"), metavar="DIR", help="default: %(default)s")
     series.set_defaults(command=commands_by_name["series"])
-    return [compare, series]
+    parity = commands.add_parser("parity", help="compare with Cycles on many .blend files, in one table and page")
+    parity.add_argument(
+        "folders", type=Path, nargs="+", metavar="DIR", help="searched for .blend files; or such a file"
+    )
+    parity.add_argument("--engine", default="path", metavar="ID", help="integrator; default: %(default)s")
+    limit = parity.add_mutually_exclusive_group()
+    limit.add_argument("--samples", type=types.at_least_one, metavar="N", help="per pixel of each picture; default: 64")
+    limit.add_argument("--time", type=types.positive, metavar="S", help="seconds of each picture")
+    parity.add_argument(
+        "--size",
+        type=types.at_least_one,
+        default=128,
+        metavar="N",
+        help="pixels along the longer side; default: %(default)s",
+    )
+    parity.add_argument("--threads", type=types.at_least_one, metavar="N", help="default: the scenes'")
+    parity.add_argument(
+        "--limit",
+        type=types.positive,
+        default=1800.0,
+        metavar="S",
+        help="give a scene up after this many seconds; default: %(default)g",
+    )
+    parity.add_argument(
+        "--notes", type=Path, metavar="FILE.json", help="what is known of scenes, by name, for their rows"
+    )
+    parity.add_argument("--fresh", action="store_true", help="render scenes anew that an earlier run finished")
+    parity.add_argument("-o", "--output", type=Path, default=Path("parity"), metavar="DIR", help="default: %(default)s")
+    parity.set_defaults(command=commands_by_name["parity"])
+    return [compare, series, parity]
 
 
 def add_limits(command, types) -> None:

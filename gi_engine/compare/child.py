@@ -1,4 +1,5 @@
-"""A process of its own that renders what it is asked for (worker.py). What crashes, hangs or fails there is a ChildFailed here. No bpy."""
+"""A process of its own that does what it is asked for: renders (worker.py) or compares on one scene (one.py). What crashes, hangs or fails
+there is a ChildFailed here. No bpy."""
 
 from __future__ import annotations
 
@@ -33,9 +34,9 @@ def blender_program() -> str:
     return bpy.app.binary_path if bpy else ""
 
 
-def command() -> list[str]:
-    worker = __package__ + ".worker"
-    run = f"import importlib; importlib.import_module({worker!r}).main()"
+def command(module: str) -> list[str]:
+    """Runs `main` of a module of this package."""
+    run = f"import importlib; importlib.import_module({__package__ + '.' + module!r}).main()"
     program = blender_program()
     if program:  # with the user's preferences, which know the add-on
         return [program, "--background", "--python-exit-code", "1", "--python-expr", run]
@@ -43,9 +44,9 @@ def command() -> list[str]:
 
 
 class Child:
-    """Use as a context manager: leaving it ends the process."""
+    """Use as a context manager: leaving it ends the process, and what that has started."""
 
-    def __init__(self, stopped=lambda: False):
+    def __init__(self, stopped=lambda: False, module: str = "worker"):
         self.stopped = stopped
         self.lines: queue.Queue = queue.Queue()
         self.last_words: collections.deque = collections.deque(maxlen=5)
@@ -54,7 +55,7 @@ class Child:
         paths = [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
         self.process = subprocess.Popen(
-            command(),
+            command(module),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import shutil
 from pathlib import Path
 
 from .. import control, native
@@ -11,8 +12,8 @@ from ..arguments import ArgumentError, check_file
 from ..control import Control, Progress
 from ..display import display_on
 from ..output import OutputError
+from . import parity, report, runner, summary
 from . import plan as plans
-from . import report, runner
 from .child import Cancelled
 
 DONE, FAILED, CANCELLED = 0, 1, 130
@@ -24,8 +25,7 @@ def compare_command(arguments, out, err) -> int:
     plan = plan_of(arguments)
     wishes = Control()
     with controlled(wishes, err), interruptible(wishes), display_on(err) as display:
-        watcher = Teller(display, err, out if arguments.machine_progress else None)
-        result = runner.compare(plan, watcher)
+        result = runner.compare(plan, Teller(display, err))
         page = report.write(result)
         return outcome(result, page, display, (out, err))
 
@@ -66,11 +66,44 @@ def series_command(arguments, out, err) -> int:
     return FAILED if any(step.error for step in finished) else DONE
 
 
-class Teller(runner.Watcher):
-    """To the terminal, and as lines of JSON to `machine` if there is one."""
+def parity_command(arguments, out, err) -> int:
+    from ..cli import controlled, interruptible
 
-    def __init__(self, display, err, machine=None):
-        self.display, self.err, self.machine = display, err, machine
+    survey = survey_of(arguments)
+    wishes = Control()
+    with controlled(wishes, err), interruptible(wishes), display_on(err) as display:
+        rows, cancelled = parity.run(survey, Teller(display, err))
+        if rows:
+            display.say(f"{summary.counts(rows)}\n{survey.output / 'parity.html'}", out)
+        if cancelled:
+            display.say("gi-engine: cancelled; the same command goes on where it was", err)
+            return CANCELLED
+    return FAILED if any(row.get("error") for row in rows) else DONE
+
+
+def survey_of(arguments) -> parity.Survey:
+    """Raises ArgumentError, OutputError."""
+    native.module()
+    try:
+        engine, scenes = plans.find_engine(arguments.engine), parity.find_scenes(arguments.folders)
+        notes = json.loads(arguments.notes.read_text(encoding="utf-8")) if arguments.notes else {}
+    except plans.PlanError as error:
+        raise ArgumentError(str(error)) from error
+    except (OSError, ValueError) as error:
+        raise ArgumentError(f'--notes: "{arguments.notes}" cannot be read: {error}') from error
+    survey = parity.Survey(scenes, made(arguments.output), engine, longest=arguments.size, limit=arguments.limit)
+    survey.samples, survey.seconds = (0 if arguments.time else arguments.samples or 64), arguments.time or 0.0
+    survey.threads, survey.notes = arguments.threads or 0, notes
+    if arguments.fresh:
+        shutil.rmtree(survey.output / "scenes", ignore_errors=True)
+    return survey
+
+
+class Teller(runner.Watcher):
+    """To the terminal."""
+
+    def __init__(self, display, err):
+        self.display, self.err = display, err
         self.title = None
 
     def progress(self, fraction: float, text: str) -> None:
@@ -79,8 +112,6 @@ class Teller(runner.Watcher):
             self.title = title
             self.display.begin(title)
         self.display.update(Progress(stage=words or "…", fraction=fraction))
-        if self.machine:
-            print(json.dumps({"fraction": fraction, "text": text}), file=self.machine, flush=True)
 
     def say(self, text: str) -> None:
         self.display.say(f"gi-engine: {text}", self.err)

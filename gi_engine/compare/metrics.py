@@ -42,23 +42,30 @@ def own_noise(reference: np.ndarray, variance, kept=...) -> float:
     return float(relative_errors(reference + noise, reference + noise, reference)[kept].mean())
 
 
+def of_two(image: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of two pictures by different seeds, and the variance of each pixel of it, with one degree of freedom."""
+    image, other = np.asarray(image, np.float64), np.asarray(other, np.float64)
+    return (image + other) / 2, (image - other) ** 2 / 4
+
+
 def blocks_of(pixels: np.ndarray) -> np.ndarray:
-    """(rows, columns) sums over blocks and channels; blocks at the right and lower edge may be partial."""
-    grey = pixels.sum(-1, dtype=np.float64)
-    rows, columns = range(0, grey.shape[0], BLOCK), range(0, grey.shape[1], BLOCK)
-    return np.add.reduceat(np.add.reduceat(grey, rows, 0), columns, 1)
+    """(rows, columns, channels) sums over blocks; blocks at the right and lower edge may be partial."""
+    rows, columns = range(0, pixels.shape[0], BLOCK), range(0, pixels.shape[1], BLOCK)
+    return np.add.reduceat(np.add.reduceat(pixels.astype(np.float64), rows, 0), columns, 1)
 
 
-def allowed_errors(blocks: int) -> float:
-    """Standard errors that a block may be off: Student's t with a degree of freedom a pixel, corrected for the number of blocks."""
-    z = NormalDist().inv_cdf(1 - FALSE_ALARM / (2 * max(blocks, 1)))
-    return z + (z**3 + z) / (4 * BLOCK * BLOCK)
+def allowed_errors(freedom: np.ndarray) -> np.ndarray:
+    """Standard errors that each of these sums may be off: quantiles of Student's t, corrected for the number of sums
+    [Abramowitz & Stegun 1964, 26.7.5]."""
+    z = NormalDist().inv_cdf(1 - FALSE_ALARM / (2 * max(freedom.size, 1)))
+    terms = ((z**3 + z) / 4, (5 * z**5 + 16 * z**3 + 3 * z) / 96, (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384)
+    return z + sum(term / freedom**power for power, term in enumerate(terms, 1))
 
 
 @dataclass
 class Blocks:
-    relative: np.ndarray  # signed error of each block over the reference's
-    beyond: np.ndarray  # where that is no noise
+    relative: np.ndarray  # (rows, columns) signed error of each block over the reference's
+    beyond: np.ndarray  # (rows, columns) where that is no noise, in any channel
     worst: float  # the largest error in standard errors
 
     def figures(self) -> dict:
@@ -71,16 +78,21 @@ class Blocks:
         }
 
 
-def block_errors(mean: np.ndarray, variance: np.ndarray, reference: np.ndarray, reference_variance) -> Blocks:
-    """`variance`: of each pixel of `mean`; pixels are taken as independent."""
+def block_errors(
+    mean: np.ndarray, variance: np.ndarray, reference: np.ndarray, reference_variance, rounding: float = ROUNDING
+) -> Blocks:
+    """`variance`: of each pixel of `mean`; pixels are taken as independent, with a degree of freedom each. `rounding`: share of a block that
+    is no difference."""
     truth = blocks_of(reference)
     difference = blocks_of(mean) - truth
     error = np.sqrt(blocks_of(variance) + blocks_of(np.broadcast_to(reference_variance, reference.shape)))
-    floor = DARKEST * float(np.abs(truth).mean()) + 1e-20
-    tolerance = ROUNDING * np.abs(truth) + 1e-6 * BLOCK * BLOCK
+    allowed = allowed_errors(blocks_of(np.ones(reference.shape)))
+    # An absolute part, for blocks that are black in one by 1e-7 and in the other exactly.
+    tolerance = rounding * np.abs(truth) + 1e-6 * BLOCK * BLOCK
+    brightness = np.abs(truth.sum(-1))
     return Blocks(
-        relative=difference / (np.abs(truth) + floor),
-        beyond=np.abs(difference) > allowed_errors(truth.size) * error + tolerance,
+        relative=difference.sum(-1) / (brightness + DARKEST * float(brightness.mean()) + 1e-20),
+        beyond=(np.abs(difference) > allowed * error + tolerance).any(-1),
         worst=float((np.abs(difference) / np.maximum(error, tolerance)).max()),
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from .. import native
@@ -32,9 +32,11 @@ class Plan:
     until: float = 0.0  # relative mean squared error
     reference_seconds: float = 0.0  # 0: as many times an engine's as REFERENCE_TIMES
     reference_samples: int = 0
-    steps: int = 3
+    reference_pieces: int = 8  # by different seeds
+    steps: int = 3  # renders of each engine before the one by another seed, each STEP times as long as the one before
     frame: int | None = None
     resolution: tuple[int, int] | None = None
+    longest: int = 0  # pixels along the longer side; 0: the scene's
     region: tuple[float, float, float, float] | None = None  # left, bottom, right, top: shares of the picture
     threads: int = 0  # 0: the scene's
     limit: float = 600.0  # seconds that one render may take beyond what was asked for
@@ -46,10 +48,28 @@ class Plan:
         return {
             "frame": self.frame,
             "resolution": self.resolution,
+            "longest": self.longest,
             "region": self.region,
             "neutral": self.neutral,
             "threads": self.threads,
         }
+
+
+def to_json(plan: Plan) -> dict:
+    """Paths are absolute, so that who reads it may be elsewhere."""
+    return {name: str(value.absolute()) if isinstance(value, Path) else value for name, value in asdict(plan).items()}
+
+
+def from_json(fields: dict) -> Plan:
+    tuples = {name: tuple(value) for name, value in fields.items() if name in ("resolution", "region") and value}
+    paths = {name: Path(value) for name, value in fields.items() if name in ("file", "output", "cache") and value}
+    if is_picture(fields["reference"]):
+        paths["reference"] = Path(fields["reference"])
+    return Plan(**fields | tuples | paths)
+
+
+def is_picture(reference: str) -> bool:
+    return reference.lower().endswith(".exr")
 
 
 def engine_label(engine: str) -> str:
@@ -74,7 +94,7 @@ def find_engines(text: str) -> list[str]:
 
 
 def find_reference(text: str) -> str | Path:
-    if text.lower().endswith(".exr"):
+    if is_picture(text):
         if not Path(text).is_file():
             raise PlanError(f'reference "{text}" is not there')
         return Path(text)

@@ -14,7 +14,6 @@ from .metrics import own_noise
 from .pictures import PictureError, read_exr, read_passes, reads_passes
 from .plan import Plan
 
-PIECES = 8
 FIRST_SEED = 1000  # far from those of the pictures that are compared
 TIMES = 10  # an engine's seconds or samples
 
@@ -60,7 +59,7 @@ def render(child, plan: Plan, folder: Path, warn, on_progress) -> Reference:
         path = folder / f"piece_{number:03d}.exr"
         kept = read_piece(path, warn)
         if kept is None:
-            share = wanted / PIECES
+            share = wanted / plan.reference_pieces
             limits = {"samples": max(1, round(share)) if what == "samples" else 0}
             limits["seconds"] = share if what == "sampling" else 0.0
             at = done / wanted

@@ -231,7 +231,7 @@ def judge_one(rendered: Rendered, truth: Reference, output: Path) -> None:
     mean, variance = image, np.zeros_like(image)
     if twice:
         again = np.nan_to_num(rendered.again, posinf=0, neginf=0)
-        mean, variance = (image + again) / 2, (image - again) ** 2 / 4
+        mean, variance = metrics.of_two(image, again)
         figures["systematic_mse"] = metrics.systematic_mse(image, again, truth.pixels, truth.variance)
         figures["relative_mse"] = (figures["relative_mse"] + metrics.relative_mse(again, truth.pixels)) / 2
     figures["mean_ratio"], figures["mean_ratio_error"] = metrics.mean_ratio(

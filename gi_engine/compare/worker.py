@@ -1,12 +1,10 @@
-"""The process that renders: opens one scene and does what its parent asks for, line by line (child.py). Leaves the file untouched.
+"""The process that renders: opens one scene and renders it as its parent asks (child.py). Leaves the file untouched.
 
-Answers are lines of JSON after child.TAG. What is not about light transport is off for every engine: denoising, adaptive sampling,
-compositing, the sequencer. Everything else is the scene's own."""
+What is not about light transport is off for every engine: denoising, adaptive sampling, compositing, the sequencer. Everything else is
+the scene's own."""
 
 from __future__ import annotations
 
-import json
-import os
 import re
 import sys
 import time
@@ -17,8 +15,8 @@ import numpy as np
 
 from .. import control, headless
 from ..control import Control, RenderError
-from ..display import quiet
-from .child import TAG
+from .metrics import BLOCK
+from .service import serve
 
 UNLIMITED = 1 << 20  # samples, where time is the limit
 TELL_SECONDS = 0.25
@@ -26,24 +24,7 @@ SAMPLE = re.compile(r"Sample (\d+)/\d+")
 
 
 def main() -> None:
-    with quiet() as (out, _):
-        state = State(lambda **said: print(TAG + json.dumps(said), file=out, flush=True))
-        state.say(ready=True)
-        for line in sys.stdin:
-            request = json.loads(line)
-            try:
-                answer = DEEDS[request.pop("do")](state, **request)
-            except Exception as error:
-                answer = {"error": first_line(error)}
-            state.say(**answer)
-        os._exit(0)  # Blender's module can hang at exit
-
-
-def first_line(error: Exception) -> str:
-    if not isinstance(error, (RenderError, RuntimeError, OSError, ValueError)):
-        return f"internal error: {type(error).__name__}: {error}"
-    lines = headless.message_of(error).splitlines() if str(error) else [type(error).__name__]
-    return lines[0]
+    serve(DEEDS, State)
 
 
 class State:
@@ -119,6 +100,8 @@ def prepare(scene, view: dict) -> None:
         scene.frame_set(view["frame"])
     if view["resolution"]:
         headless.set_resolution(scene, *view["resolution"])
+    if view["longest"]:
+        headless.set_resolution(scene, *shrunk(scene.render, view["longest"]))
     if view["region"]:
         render.use_border = render.use_crop_to_border = True
         render.border_min_x, render.border_min_y, render.border_max_x, render.border_max_y = view["region"]
@@ -135,12 +118,22 @@ def prepare(scene, view: dict) -> None:
             neutralize(cycles)
 
 
+def shrunk(render, longest: int) -> tuple[int, int]:
+    """The picture's size with `longest` pixels along its longer side, in whole blocks."""
+    factor = longest / max(render.resolution_x, render.resolution_y)
+    sides = (render.resolution_x, render.resolution_y)
+    return tuple(max(BLOCK, round(side * factor / BLOCK) * BLOCK) for side in sides)
+
+
 def neutralize(cycles) -> None:
     """Takes away what makes the engines differ by design or pixels depend on one another."""
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.blur_glossy = 0.0
     cycles.light_sampling_threshold, cycles.pixel_filter_type, cycles.filter_width = 0.0, "BOX", 1.0
     cycles.use_guiding = cycles.use_fast_gi = False
     cycles.sampling_pattern = "TABULATED_SOBOL"
+    for item in bpy.data.objects:
+        if hasattr(item, "shadow_terminator_geometry_offset"):
+            item.shadow_terminator_geometry_offset = 0.0  # moves where shadow rays begin, by taste
     for lamp in bpy.data.lights:
         lamp.cycles.is_caustics_light = False  # manifold walks: too dark beside caustics
 
