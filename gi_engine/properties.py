@@ -12,6 +12,8 @@ from . import native
 from .export.settings import SHARED
 from .scene_data import LIGHTMAP_CONTENTS as CONTENTS
 
+# Blender 5 wants to be told of paths that may begin with "//".
+RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (5, 0) else set()
 MISFITS = (
     ("WITHOUT", "Render Without", "Leave the file as it is, under a warning"),
     ("REPLACE", "Replace", "Start a new one in its place, unless it is no file of GI Engine's"),
@@ -66,6 +68,7 @@ def fixed_properties() -> dict:
             name="Cache File",
             description="Keeps what was worked out from one render to the next; empty for no file",
             subtype="FILE_PATH",
+            options=RELATIVE,
         ),
         "kept_misfit": EnumProperty(
             name="Unusable File", description="Where the file is damaged or does not fit the scene", items=MISFITS
@@ -118,7 +121,7 @@ def integrator_group(descriptor: dict) -> type:
     return type(f"GI_PG_{descriptor['id']}", (bpy.types.PropertyGroup,), {"__annotations__": own})
 
 
-def settings_group(descriptors: list[dict], groups: dict[str, type]) -> type:
+def settings_group(descriptors: list[dict], groups: dict[str, type], compared: type) -> type:
     items = [(d["id"], d["label"], d.get("blurb", "")) for d in descriptors] or [("path", "Path tracing", "")]
     default = next((item[0] for item in items if item[0] == "path"), items[0][0])
     annotations = fixed_properties()
@@ -130,9 +133,47 @@ def settings_group(descriptors: list[dict], groups: dict[str, type]) -> type:
     for name in annotations.keys() & SHARED.keys():
         annotations[name].keywords["update"] = take_over(name)
     annotations["lightmap"] = PointerProperty(type=GI_PG_lightmap)
+    annotations["compare"] = PointerProperty(type=compared)
     for identifier, group in groups.items():
         annotations[identifier] = PointerProperty(type=group)
     return type("GI_PG_scene", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
+
+
+def compare_group(descriptors: list[dict]) -> type:
+    """Of the button that compares."""
+    engines = [*((d["id"], d["label"], d.get("blurb", "")) for d in descriptors), ("cycles", "Cycles", "Blender's own")]
+    chosen = {"path", "cycles"} & {item[0] for item in engines}
+    from_file = ("FILE", "Image File", "An EXR of the same size")
+    annotations = {
+        "engines": EnumProperty(
+            name="Engines", description="What renders the scene", items=engines, default=chosen, options={"ENUM_FLAG"}
+        ),
+        "seconds": FloatProperty(
+            name="Time",
+            description="Seconds of sampling of each engine's last picture; it renders shorter ones before, and one more by another seed",
+            default=10,
+            min=0.1,
+            soft_max=600,
+            unit="TIME_ABSOLUTE",
+        ),
+        "reference": EnumProperty(
+            name="Reference",
+            description="What is taken for the truth: an engine, for ten times as long, or a picture",
+            items=[*reversed(engines), from_file],
+            default="cycles",
+        ),
+        "reference_file": StringProperty(
+            name="File", description="The reference's EXR", subtype="FILE_PATH", options=RELATIVE
+        ),
+        "folder": StringProperty(
+            name="Folder",
+            description="For the report and all pictures; empty keeps them until Blender is closed",
+            subtype="DIR_PATH",
+            options=RELATIVE,
+        ),
+        "open_report": BoolProperty(name="Open Report", description="In the browser, when it is done", default=True),
+    }
+    return type("GI_PG_compare", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
 
 
 class GI_PG_lightmap(bpy.types.PropertyGroup):
@@ -152,6 +193,7 @@ class GI_PG_lightmap(bpy.types.PropertyGroup):
         name="Folder",
         description="For an EXR of each object; empty keeps images in the .blend file",
         subtype="DIR_PATH",
+        options=RELATIVE,
     )
 
 
@@ -178,8 +220,9 @@ _registered: list[type] = []
 def register() -> None:
     descriptors = native.integrators()
     groups = {d["id"]: integrator_group(d) for d in descriptors}
-    scene_group = settings_group(descriptors, groups)
-    for cls in (*groups.values(), GI_PG_lightmap, scene_group, GI_PG_view_layer):
+    compared = compare_group(descriptors)
+    scene_group = settings_group(descriptors, groups, compared)
+    for cls in (*groups.values(), compared, GI_PG_lightmap, scene_group, GI_PG_view_layer):
         bpy.utils.register_class(cls)
         _registered.append(cls)
     bpy.types.Scene.gi_engine = PointerProperty(type=scene_group)

@@ -112,7 +112,7 @@ class Child:
             except queue.Empty:
                 if time.monotonic() > deadline:
                     self.close()
-                    raise ChildFailed(f"not done after {limit:.0f} s") from None
+                    raise ChildFailed(f"not done after {limit:g} s") from None
                 continue
             if line is None:
                 raise ChildFailed(self.end())

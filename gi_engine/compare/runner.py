@@ -194,6 +194,8 @@ class Run:
 
     def judge(self) -> None:
         self.show()
+        if self.result.reference is not None:
+            self.name_missing_packages()
         for rendered in self.result.engines:
             if rendered.pixels is None or self.result.reference is None:
                 continue
@@ -202,6 +204,13 @@ class Run:
                 rendered.error = f"the picture is {w}x{h} pixels, the reference {rw}x{rh}: not compared"
                 continue
             judge_one(rendered, self.result.reference, self.plan.output)
+
+    def name_missing_packages(self) -> None:
+        """Inside Blender there is no pip."""
+        if not metrics.has_flip():
+            self.warn("FLIP is left out: the Python package flip-evaluator is not there")
+        if not pictures.reads_passes():
+            self.warn("passes are left out: the Python package OpenEXR is not there")
 
     def show(self) -> None:
         """Pictures through the scene's view transform, by a process with the scene open."""

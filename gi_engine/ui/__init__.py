@@ -1,8 +1,8 @@
 """Panels and operators: our own, and Blender's that we join."""
 
-from . import compat, lightmap, object_panels, operators, render_panels, strategies
+from . import compare, compat, lightmap, object_panels, operators, render_panels, strategies
 
-PARTS = (operators, strategies, render_panels, lightmap, object_panels, compat)
+PARTS = (operators, strategies, render_panels, lightmap, compare, object_panels, compat)
 
 
 def register() -> None:

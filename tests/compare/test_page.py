@@ -1,8 +1,5 @@
 """The page of a comparison in a browser without a window: what moves, moves, and what is shown, loads."""
 
-import shutil
-import warnings
-
 import numpy as np
 import pytest
 
@@ -12,10 +9,6 @@ from gi_engine.compare.reference import Reference
 from gi_engine.compare.runner import Comparison, Rendered, judge_one
 
 SIZE = (48, 64)
-
-
-def browser_program():
-    return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 
 
 @pytest.fixture(scope="module")
@@ -56,32 +49,9 @@ def test_figures_are_in_every_file(comparison):
     assert path.figures["blocks_beyond_noise"] == 0 and cycles.figures["blocks_beyond_noise"] > 40
 
 
-@pytest.fixture(scope="module")
-def browser():
-    sync_api = pytest.importorskip("playwright.sync_api")
-    program = browser_program()
-    if program is None:
-        warnings.warn("NO CHROMIUM: the page of a comparison is not tested", stacklevel=1)
-        pytest.skip("NO CHROMIUM FOUND: install chromium to test the page of a comparison")
-    with sync_api.sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield found
-        found.close()
-
-
-@pytest.fixture(params=["light", "dark"])
-def page(browser, comparison, request):
-    """The report, opened from its file; no errors and nothing fetched by the end of the test."""
-    context = browser.new_context(color_scheme=request.param, viewport={"width": 1200, "height": 900})
-    page, trouble = context.new_page(), []
-    page.on("console", lambda message: trouble.append(message.text) if message.type in ("error", "warning") else None)
-    page.on("pageerror", lambda error: trouble.append(str(error)))
-    page.on("request", lambda r: None if r.url.startswith(("file:", "data:")) else trouble.append(r.url))
-    page.goto(comparison[1].resolve().as_uri())
-    page.scheme = request.param
-    yield page
-    context.close()
-    assert not trouble
+@pytest.fixture
+def page(open_page, comparison):
+    return open_page(comparison[1])
 
 
 def test_pictures_load_and_the_bar_moves(page):

@@ -1,25 +1,21 @@
-"""Renders a scene by Cycles and by GI Engine in one process and tests whether they agree, block by block.
+"""Renders a scene by Cycles and by GI Engine in one process and tests whether they agree, block by block (gi_engine/compare/metrics.py).
 
 Each engine renders twice, with different seeds. Pixels are independent (box filter of one pixel), so the squared
-differences of the two renders give each block's variance with as many degrees of freedom as it has pixels.
-A block passes where |difference| < t * standard error + tolerance * mean, t being corrected for the number of blocks."""
+differences of the two renders give each block's variance with as many degrees of freedom as it has pixels."""
 
 from __future__ import annotations
 
 import tempfile
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import bpy
 import numpy as np
 import OpenEXR
-from scipy import stats
 
 import gi_engine
+from gi_engine.compare import metrics
 
-BLOCK = 8  # pixels
-FALSE_ALARM = 1e-5  # probability that one image that agrees is said not to
 ENGINES = ("CYCLES", "GI_ENGINE")
 
 
@@ -29,6 +25,7 @@ class Agreement:
     ratio: float  # GI Engine's mean over Cycles', all channels
     ratio_error: float  # its standard error
     worst: float  # largest |difference| / standard error of a block
+    largest: float  # relative difference of the block beyond the limit that is farthest off; 0 if there is none
     failed: int  # blocks beyond the limit
     blocks: int
     invalid: int  # pixels that are not finite
@@ -107,34 +104,19 @@ def render_pairs(scene) -> dict[str, np.ndarray]:
     return {engine: np.stack([render(scene, engine, next(seeds)) for _ in range(2)]) for engine in ENGINES}
 
 
-def blocks_of(image: np.ndarray) -> np.ndarray:
-    """(rows, columns, 3) sums over the blocks; what does not fill a block is left out."""
-    h, w = image.shape[0] // BLOCK * BLOCK, image.shape[1] // BLOCK * BLOCK
-    return image[:h, :w].reshape(h // BLOCK, BLOCK, w // BLOCK, BLOCK, -1).sum((1, 3))
-
-
-@lru_cache
-def limit(blocks: int) -> float:
-    return float(stats.t.isf(FALSE_ALARM / (2 * blocks), BLOCK * BLOCK))
-
-
 def agreement(name: str, pairs: dict[str, np.ndarray], tolerance: float) -> Agreement:
     """`tolerance`: relative difference of a block that counts as rounding and table lookup."""
     theirs, ours = (pairs[e] for e in ENGINES)
     invalid = int(np.count_nonzero(~np.isfinite(ours)))
-    theirs, ours = np.nan_to_num(theirs, posinf=0, neginf=0), np.nan_to_num(ours, posinf=0, neginf=0)
-    difference = blocks_of(ours.mean(0) - theirs.mean(0))
-    variance = sum(blocks_of((pair[0] - pair[1]) ** 2) / 4 for pair in (theirs, ours))
-    error, mean = np.sqrt(variance), blocks_of(theirs.mean(0))
-    # An absolute floor, for blocks that are black in one engine by 1e-7 and in the other exactly.
-    allowed = limit(mean.size) * error + tolerance * np.abs(mean) + 1e-6 * BLOCK * BLOCK
-    total = max(theirs.mean(), 1e-12)
+    both = (metrics.of_two(*np.nan_to_num(pair, posinf=0, neginf=0)) for pair in (ours, theirs))
+    (mean, variance), (truth, noise) = both
+    found = metrics.block_errors(mean, variance, truth, noise, tolerance).figures()
     return Agreement(
-        name=name,
-        ratio=ours.mean() / total,
-        ratio_error=float(np.sqrt(variance.sum()) / (theirs[0].size * total)),
-        worst=float((np.abs(difference) / np.maximum(error, tolerance * np.abs(mean) + 1e-6)).max()),
-        failed=int(np.count_nonzero(np.abs(difference) > allowed)),
-        blocks=mean.size,
+        name,
+        *metrics.mean_ratio(mean, variance, truth, noise),
+        worst=found["worst_block"],
+        largest=found["largest_beyond_noise"],
+        failed=found["blocks_beyond_noise"],
+        blocks=found["blocks"],
         invalid=invalid,
     )
