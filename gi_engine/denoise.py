@@ -1,5 +1,5 @@
-"""Blender's own copy of Open Image Denoise, called directly: takes the noise out of a lightmap. Leaves out pictures, whose
-denoiser is the compositor's. No bpy: the caller says where Blender lies."""
+"""Blender's own copy of Open Image Denoise, called directly: takes the noise out of pictures and lightmaps, on the processor.
+No bpy: the caller says where Blender lies."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ SIGNATURES = {
     "oidnNewFilter": (POINTER, [POINTER, TEXT]),
     "oidnSetSharedFilterImage": (None, [POINTER, TEXT, POINTER, ctypes.c_int, SIZE, SIZE, SIZE, SIZE, SIZE]),
     "oidnSetFilterBool": (None, [POINTER, TEXT, ctypes.c_bool]),
+    "oidnSetFilterInt": (None, [POINTER, TEXT, ctypes.c_int]),
     "oidnCommitFilter": (None, [POINTER]),
     "oidnExecuteFilter": (None, [POINTER]),
     "oidnReleaseFilter": (None, [POINTER]),
@@ -43,29 +44,61 @@ def load(blender: tuple[str, ...]):
     return None
 
 
+QUALITIES = {"HIGH": 6, "BALANCED": 5, "FAST": 4}  # OIDN_QUALITY_*
+
+
 def denoise_lightmap(pixels: np.ndarray, blender: tuple[str, ...]) -> np.ndarray | None:
     """(height, width, 3) float32, scene-linear, to the same without noise; None where there is no denoiser. `blender`: folders.
 
     Raises RuntimeError where it fails."""
+    return denoise(pixels, {}, blender)
+
+
+def denoise(
+    pixels: np.ndarray,
+    guides: dict[str, np.ndarray],
+    blender: tuple[str, ...],
+    quality: str = "HIGH",
+    prefilter: str = "NONE",
+) -> np.ndarray | None:
+    """(height, width, 3 or 4) float32, scene-linear, to the same without noise; alpha stays. None where there is no denoiser.
+
+    `guides`: "albedo" and "normal", (height, width, 3), or fewer; `quality`, `prefilter`: as Cycles names them; with ACCURATE the
+    guides themselves are denoised first, with FAST they are taken for clean. `blender`: folders. Raises RuntimeError."""
     oidn = load(blender)
     if oidn is None:
         return None
-    color = np.ascontiguousarray(pixels, np.float32)
-    output = np.empty_like(color)
-    height, width, _ = color.shape
+    images = {name: np.ascontiguousarray(image[..., :3], np.float32) for name, image in guides.items()}
     device = oidn.oidnNewDevice(CPU)
     oidn.oidnCommitDevice(device)
-    lightmap = oidn.oidnNewFilter(device, b"RT")  # Blender's copy leaves the weights of RTLightmap out
-    for name, array in ((b"color", color), (b"output", output)):
-        oidn.oidnSetSharedFilterImage(lightmap, name, array.ctypes.data, FLOAT3, width, height, 0, 0, 0)
-    oidn.oidnSetFilterBool(lightmap, b"hdr", True)
-    oidn.oidnCommitFilter(lightmap)
-    oidn.oidnExecuteFilter(lightmap)
+    try:
+        if prefilter == "ACCURATE":
+            images = {name: run(oidn, device, {name: image}, {}) for name, image in images.items()}
+        options = {"hdr": True, "cleanAux": bool(images) and prefilter != "NONE"}
+        color = np.ascontiguousarray(pixels[..., :3], np.float32)
+        clean = run(oidn, device, {"color": color} | images, options, QUALITIES[quality])
+    finally:
+        oidn.oidnReleaseDevice(device)
+    return np.concatenate([clean, pixels[..., 3:]], axis=-1) if pixels.shape[-1] > 3 else clean
+
+
+def run(oidn, device, images: dict, options: dict, quality: int = QUALITIES["HIGH"]) -> np.ndarray:
+    """One filter over images of one size; the first says what is denoised."""
+    output = np.empty_like(next(iter(images.values())))
+    height, width, _ = output.shape
+    # Of the filter for lightmaps Blender's copy leaves the weights out.
+    made = oidn.oidnNewFilter(device, b"RT")
+    for name, array in (images | {"output": output}).items():
+        oidn.oidnSetSharedFilterImage(made, name.encode(), array.ctypes.data, FLOAT3, width, height, 0, 0, 0)
+    for name, value in options.items():
+        oidn.oidnSetFilterBool(made, name.encode(), value)
+    oidn.oidnSetFilterInt(made, b"quality", quality)
+    oidn.oidnCommitFilter(made)
+    oidn.oidnExecuteFilter(made)
     message = TEXT()
     failed = oidn.oidnGetDeviceError(device, ctypes.byref(message))
     said = (message.value or b"").decode(errors="replace")
-    oidn.oidnReleaseFilter(lightmap)
-    oidn.oidnReleaseDevice(device)
+    oidn.oidnReleaseFilter(made)
     if failed:
         raise RuntimeError(f"denoising failed: {said}")
     return output

@@ -12,11 +12,12 @@ import bpy
 import numpy as np
 
 from . import control, native
-from .bake import BakeError, bake_for_blender
+from .bake import BakeError, bake_for_blender, blender_folders
+from .denoise import denoise
 from .display import duration
 from .export import Exported, ExportError, export
 from .keeping import Keeping, KeepingError, KeptFileError, keeps
-from .passes import contract_name, passes_of
+from .passes import NOISY, contract_name, passes_of
 from .session import RenderFailed, Session
 
 WHOLE = 1 << 16  # begin_result clamps it to the border's size
@@ -161,6 +162,8 @@ class GIEngine(bpy.types.RenderEngine):
             self.tell(session.progress())
         self.show(session, result)
         progress = session.progress()
+        if self.exported.settings.denoising and progress["passes"] and not self.is_preview:
+            self.denoise(session, result)
         self.next_status = 0.0
         self.tell(progress)
         for message in session.native.messages():
@@ -175,7 +178,23 @@ class GIEngine(bpy.types.RenderEngine):
         for blender_pass in result.layers[0].passes:
             name = contract_name(blender_pass.name)
             if name:
-                blender_pass.rect.foreach_set(np.ascontiguousarray(session.read(name), np.float32).ravel())
+                fill(blender_pass, session.read("Combined" if name == NOISY else name))
+        self.update_result(result)
+
+    def denoise(self, session: Session, result) -> None:
+        """Of the finished picture: the pass Noisy Image stays as it is."""
+        wishes = self.exported.settings.denoising
+        self.update_stats("", "Denoising")
+        guides = {guide: session.read(name) for guide, name in wishes.guides.items()}
+        try:
+            clean = denoise(session.read("Combined"), guides, blender_folders(), wishes.quality, wishes.prefilter)
+        except RuntimeError as error:
+            self.warn(f"{error}; the picture stays as it is")
+            return
+        if clean is None:
+            self.warn("this Blender brings no denoiser: the picture stays as it is")
+            return
+        fill(result.layers[0].passes["Combined"], clean)
         self.update_result(result)
 
     def tell(self, progress: dict) -> None:
@@ -233,8 +252,12 @@ class GIEngine(bpy.types.RenderEngine):
             _running.pop()
 
     def update_render_passes(self, scene=None, renderlayer=None):
-        for p in passes_of(renderlayer):
+        for p in passes_of(renderlayer, scene):
             self.register_pass(scene, renderlayer, p.blender_name, len(p.channels), p.channels, p.kind)
+
+
+def fill(blender_pass, pixels: np.ndarray) -> None:
+    blender_pass.rect.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
 
 
 def describe(error: Exception) -> str:

@@ -26,11 +26,17 @@ class Pass:
 DENOISING = "cycles.denoising_store_passes"
 SAMPLE_COUNT = "cycles.pass_debug_sample_count"
 
+# The picture before it is denoised. The native side calls it Combined.
+NOISY = "Noisy Image"
+OF_SCENE = "id_data."  # what follows is the scene's, not the view layer's
+DENOISED = OF_SCENE + "gi_engine.use_denoising"
+
 TERMS = ("Direct", "Specular", "Caustic", "Global")  # which photon mapping's picture is the sum of
 PHOTONS = ("Photons", "Photon Density", "Photon Radius")
 
 PASSES = (
     Pass("Combined", "Combined", "RGBA", "COLOR"),
+    Pass(NOISY, NOISY, "RGBA", "COLOR", (DENOISED,)),
     Pass("Depth", "Depth", "Z", "VALUE", ("use_pass_z",)),
     Pass("Normal", "Normal", "XYZ", "VECTOR", ("use_pass_normal",)),
     Pass("Position", "Position", "XYZ", "VECTOR", ("use_pass_position",)),
@@ -48,13 +54,15 @@ PASSES = (
 )
 
 
-def passes_of(view_layer) -> list[Pass]:
-    """The passes that the view layer asks for."""
-    return [p for p in PASSES if not p.wanted or any(flag(view_layer, path) for path in p.wanted)]
+def passes_of(view_layer, scene=None) -> list[Pass]:
+    """The passes that the view layer asks for. `scene`: its own, which it does not know itself while Blender registers passes."""
+    scene = scene or view_layer.id_data
+    return [p for p in PASSES if not p.wanted or any(flag(view_layer, scene, path) for path in p.wanted)]
 
 
-def flag(owner, path: str) -> bool:
-    for name in path.split("."):
+def flag(view_layer, scene, path: str) -> bool:
+    owner = scene if path.startswith(OF_SCENE) else view_layer
+    for name in path.removeprefix(OF_SCENE).split("."):
         owner = getattr(owner, name, False)
     return bool(owner)
 

@@ -19,6 +19,26 @@ MISFITS = (
     ("REPLACE", "Replace", "Start a new one in its place, unless it is no file of GI Engine's"),
     ("STOP", "Stop", "Do not render"),
 )
+# Of the denoiser, as Cycles names them.
+INPUTS = (
+    ("RGB", "None", "The picture alone"),
+    ("RGB_ALBEDO", "Albedo", "Guided by the colours of surfaces: keeps textures"),
+    (
+        "RGB_ALBEDO_NORMAL",
+        "Albedo and Normal",
+        "Guided by the colours and the directions of surfaces: keeps textures and edges",
+    ),
+)
+PREFILTERS = (
+    ("NONE", "None", "The guides are as noisy as they are; tolerant, keeps less detail"),
+    ("FAST", "Fast", "The guides are taken for clean: keeps most detail, and their noise"),
+    ("ACCURATE", "Accurate", "The guides are denoised first: keeps most detail, takes longest"),
+)
+QUALITY = (
+    ("HIGH", "High", "Best, and slowest"),
+    ("BALANCED", "Balanced", "Between the two"),
+    ("FAST", "Fast", "For previews"),
+)
 FILTERS = (
     ("BOX", "Box", "Equal weight over the filter's width"),
     ("GAUSSIAN", "Gaussian", "Bell curve"),
@@ -98,6 +118,23 @@ def fixed_properties() -> dict:
     }
 
 
+def denoising_properties() -> dict:
+    """Named as Cycles names its own. Not shared with it: a comparison would compare denoisers."""
+    return {
+        "use_denoising": BoolProperty(
+            name="Denoise",
+            description="Takes the noise out of the finished picture; the pass Noisy Image keeps it as it was",
+        ),
+        "denoising_input_passes": EnumProperty(
+            name="Passes", description="What guides the denoiser", items=INPUTS, default="RGB_ALBEDO_NORMAL"
+        ),
+        "denoising_prefilter": EnumProperty(
+            name="Prefilter", description="What is done about noise in the guides", items=PREFILTERS, default="ACCURATE"
+        ),
+        "denoising_quality": EnumProperty(name="Quality", description="Slower is better", items=QUALITY),
+    }
+
+
 def property_of(parameter: dict):
     """A bpy property for one parameter of a descriptor."""
     options = {"name": parameter["label"], "description": parameter.get("help", ""), "default": parameter["default"]}
@@ -124,7 +161,7 @@ def integrator_group(descriptor: dict) -> type:
 def settings_group(descriptors: list[dict], groups: dict[str, type], compared: type) -> type:
     items = [(d["id"], d["label"], d.get("blurb", "")) for d in descriptors] or [("path", "Path tracing", "")]
     default = next((item[0] for item in items if item[0] == "path"), items[0][0])
-    annotations = fixed_properties()
+    annotations = fixed_properties() | denoising_properties()
     annotations["integrator"] = EnumProperty(
         name="Integrator", items=items, default=default, description="How light is followed"
     )

@@ -201,6 +201,21 @@ class Scene:
 
 
 @dataclass
+class Denoising:
+    """What the denoiser is to do with the finished picture; choices as Cycles names them."""
+
+    inputs: str = "RGB_ALBEDO_NORMAL"
+    prefilter: str = "ACCURATE"
+    quality: str = "HIGH"
+
+    @property
+    def guides(self) -> dict[str, str]:
+        """The denoiser's name of each guide, and the pass that it is."""
+        every = {"albedo": "Denoising Albedo", "normal": "Denoising Normal"}
+        return {name: passed for name, passed in every.items() if name.upper() in self.inputs}
+
+
+@dataclass
 class Settings:
     """How to render. `parameters` are the chosen integrator's own, by name."""
 
@@ -214,3 +229,4 @@ class Settings:
     keep: bool = True  # what the integrator can keep serves further frames
     kept_file: str = ""  # which holds it from render to render; "": none
     kept_misfit: str = "WITHOUT"  # WITHOUT, REPLACE or STOP: what happens where the file cannot be used
+    denoising: Denoising | None = None

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..passes import passes_of
-from ..scene_data import Film
+from ..passes import NOISY, passes_of
+from ..scene_data import Denoising, Film
 
 
 def frame_size(render) -> tuple[int, int]:
@@ -38,5 +38,20 @@ def export_film(scene, view_layer, settings, size: tuple[int, int]) -> Film:
         transparent=scene.render.film_transparent,
         transparent_glass=settings.transparent_glass,
         transparent_roughness=settings.transparent_roughness,
-        passes=[p.name for p in passes_of(view_layer)],
+        passes=wanted_passes(scene, view_layer),
     )
+
+
+def wanted_passes(scene, view_layer) -> list[str]:
+    """What the view layer asks for and what guides the denoiser; the noisy image is the native side's picture."""
+    wanted = [p.name for p in passes_of(view_layer, scene) if p.name != NOISY]
+    denoising = export_denoising(scene)
+    guides = denoising.guides.values() if denoising else ()
+    return wanted + [name for name in guides if name not in wanted]
+
+
+def export_denoising(scene) -> Denoising | None:
+    own = scene.gi_engine
+    if not own.use_denoising:
+        return None
+    return Denoising(own.denoising_input_passes, own.denoising_prefilter, own.denoising_quality)

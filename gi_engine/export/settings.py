@@ -8,6 +8,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from ..scene_data import Settings
+from .film import export_denoising
 from .ids import MASK, hash_words
 
 # Our name -> Cycles' name on scene.cycles.
@@ -96,6 +97,7 @@ def export_settings(scene, view_layer, descriptors: list[dict], integrator: str 
         keep=own.keep,
         kept_file=own.kept_file,
         kept_misfit=own.kept_misfit,
+        denoising=export_denoising(scene),
     )
 
 

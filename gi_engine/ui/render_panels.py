@@ -106,6 +106,25 @@ class GI_RENDER_PT_sampling(RenderPanel, bpy.types.Panel):
             column.operator("gi_engine.copy_from_cycles", text="Make Own Settings")
 
 
+class GI_RENDER_PT_denoise(RenderPanel, bpy.types.Panel):
+    bl_label = "Denoise"
+    bl_parent_id = "GI_RENDER_PT_sampling"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.gi_engine, "use_denoising", text="")
+
+    def draw(self, context):
+        own = context.scene.gi_engine
+        column = columns(self.layout)
+        column.active = own.use_denoising
+        column.prop(own, "denoising_input_passes")
+        row = column.row()
+        row.active = own.denoising_input_passes != "RGB"
+        row.prop(own, "denoising_prefilter")
+        column.prop(own, "denoising_quality")
+
+
 class GI_RENDER_PT_light_paths(RenderPanel, bpy.types.Panel):
     bl_label = "Light Paths"
     bl_options = {"DEFAULT_CLOSED"}
@@ -274,6 +293,7 @@ CLASSES = (
     GI_RENDER_PT_integrator,
     GI_RENDER_PT_cache,
     GI_RENDER_PT_sampling,
+    GI_RENDER_PT_denoise,
     GI_RENDER_PT_light_paths,
     GI_RENDER_PT_bounces,
     GI_RENDER_PT_clamping,

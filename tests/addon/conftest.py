@@ -10,6 +10,8 @@ import gi_engine
 from gi_engine import native
 from gi_engine.export import export
 
+from . import exr
+
 
 @pytest.fixture(scope="session", autouse=True)
 def registered():
@@ -68,6 +70,24 @@ def render_export(scene):
         if ExportOnly.error:
             raise ExportOnly.error
         return ExportOnly.exported if everything else ExportOnly.exported[0]
+
+    return run
+
+
+@pytest.fixture
+def rendered(tmp_path):
+    """Renders into a multilayer EXR of full floats and reads it."""
+
+    def run(scene):
+        settings = scene.render.image_settings
+        if hasattr(settings, "media_type"):
+            settings.media_type = "MULTI_LAYER_IMAGE"
+        settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+        if scene.render.use_multiview:
+            settings.views_format = "MULTIVIEW"
+        scene.render.filepath = str(tmp_path / "out.exr")
+        bpy.ops.render.render(write_still=True)
+        return exr.read(tmp_path / "out.exr")
 
     return run
 

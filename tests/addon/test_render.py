@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from operator import attrgetter
 
 import bpy
 import numpy as np
@@ -12,7 +13,6 @@ import pytest
 from gi_engine import control, engine, native
 from gi_engine.passes import PASSES
 
-from . import exr
 from .conftest import add, grid, mesh
 
 SQUARE = ((-50, -50, 0), (50, -50, 0), (50, 50, 0), (-50, 50, 0))
@@ -27,24 +27,6 @@ def plane(scene):
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "GAUSSIAN", 0.01
     scene.view_layers[0].use_pass_position = True
     return scene
-
-
-@pytest.fixture
-def rendered(tmp_path):
-    """Renders into a multilayer EXR of full floats and reads it."""
-
-    def run(scene):
-        settings = scene.render.image_settings
-        if hasattr(settings, "media_type"):
-            settings.media_type = "MULTI_LAYER_IMAGE"
-        settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
-        if scene.render.use_multiview:
-            settings.views_format = "MULTIVIEW"
-        scene.render.filepath = str(tmp_path / "out.exr")
-        bpy.ops.render.render(write_still=True)
-        return exr.read(tmp_path / "out.exr")
-
-    return run
 
 
 def pixel_positions(width: int, height: int) -> np.ndarray:
@@ -115,7 +97,7 @@ def test_every_pass_arrives_under_blenders_name(plane, rendered):
     layer = plane.view_layers[0]
     for path in (path for p in PASSES for path in p.wanted):
         owner, _, name = path.rpartition(".")
-        setattr(getattr(layer, owner) if owner else layer, name, True)
+        setattr(attrgetter(owner)(layer) if owner else layer, name, True)
     plane.cycles.samples = 2
     matte = bpy.data.materials.new("Matte")
     matte.use_nodes = True
