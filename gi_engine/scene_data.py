@@ -132,6 +132,9 @@ class Program:
     emission_sampling: str = "AUTO"  # NONE, AUTO, FRONT, BACK, FRONT_BACK: how its triangles are picked as lights
     transparent_shadows: bool = True
     bump_correction: bool = True  # Cycles' Bump Map Correction
+    volume: int = -1  # index of the program of what fills objects of this material; -1: nothing
+    only_volume: bool = False  # the surface is not there
+    volume_program: Program | None = None  # until it has its index
     needs: list[str] = field(default_factory=list)  # what an integrator has to carry: "subsurface", "volumes"
     approximated: list[str] = field(default_factory=list)  # what is rendered as something else, one text for each node
 

@@ -27,6 +27,7 @@ SHARED = {
     "diffuse_bounces": "diffuse_bounces",
     "glossy_bounces": "glossy_bounces",
     "transmission_bounces": "transmission_bounces",
+    "volume_bounces": "volume_bounces",
     "transparent_bounces": "transparent_max_bounces",
     "min_bounces": "min_light_bounces",
     "clamp_direct": "sample_clamp_direct",

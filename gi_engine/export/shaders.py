@@ -23,7 +23,13 @@ class Shaders:
         return [self.material(material) for material in materials]
 
     def material(self, material) -> int:
-        return self.once(material, self.compiler.material)
+        index = self.once(material, self.compiler.material)
+        program = self.scene.programs[index]
+        if program.volume_program is not None:
+            program.volume = len(self.scene.programs)
+            self.scene.programs.append(program.volume_program)
+            program.volume_program = None
+        return index
 
     def light(self, light) -> int:
         """-1 where the lamp has no nodes of its own."""

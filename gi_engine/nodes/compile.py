@@ -17,7 +17,7 @@ from .node_builder import NodeBuilder, by_identifier
 from .program import COLOR, FLOAT, VECTOR, ProgramBuilder, Value
 from .rules import CLOSURE_RULES, RULES
 
-for _family in ("values", "math", "color", "vector", "input", "textures", "closures"):
+for _family in ("values", "math", "color", "vector", "input", "textures", "closures", "volume"):
     importlib.import_module(f"{__package__}.rules_{_family}")
 
 KIND_OF_SOCKET = {"VALUE": FLOAT, "INT": FLOAT, "BOOLEAN": FLOAT, "VECTOR": VECTOR, "ROTATION": VECTOR, "RGBA": COLOR}
@@ -30,6 +30,21 @@ NOT_FOR_CYCLES = {
     "ShaderNodeSqueeze": "is from before Blender 2.8",
     "ShaderNodeScript": "needs Open Shading Language",
 }
+# Ops whose values are other ones elsewhere in an object.
+VARIES_IN_SPACE = frozenset(
+    {
+        "position",
+        "object_position",
+        "generated",
+        "uv",
+        "attribute",
+        "camera_coordinates",
+        "camera_data",
+        "window",
+        "to_space",
+        "incoming",
+    }
+)
 AS_CYCLES = "as in Cycles"
 NUMBERED = re.compile(r"^\d+_")
 DEEPEST = 20000  # Python's recursion limit while a tree is compiled: some frames for each node of a chain
@@ -114,13 +129,32 @@ class Compiler:
         walker = TreeWalker(self, f"material '{material.name}'", material)
         with deep_recursion():
             walker.surface(material, walker.tree)
+            volume = self.volume(walker, material)
         program = walker.builder.finish(material.name)
+        program.volume_program, program.only_volume = volume, volume is not None and not walker.has_surface
         program.pass_index = material.pass_index
         settings = getattr(material, "cycles", None)
         program.emission_sampling = getattr(settings, "emission_sampling", "AUTO")
         program.transparent_shadows = getattr(material, "use_transparent_shadow", True)
         program.bump_correction = getattr(getattr(material, "cycles", None), "use_bump_map_correction", True)
         return walker.noted(program)
+
+    def volume(self, surface: TreeWalker, material) -> Program | None:
+        """What fills the material's objects."""
+        output = surface.tree.get_output_node("CYCLES")
+        socket = output.inputs.get("Volume") if output else None
+        if socket is None or surface.resolve(Context(surface.tree), socket).node is None:
+            return None
+        walker = TreeWalker(self, surface.who, material, is_volume=True)
+        output = walker.tree.get_output_node("CYCLES")
+        walker.closure_input(Context(walker.tree), output.inputs["Volume"], walker.builder.constant(1.0))
+        if walker.builder.uses(VARIES_IN_SPACE):
+            walker.approximate(
+                output, "its volume varies in space; each object is filled as it is at the ray's beginning"
+            )
+        surface.needs.add("volumes")
+        surface.approximated |= walker.approximated
+        return walker.builder.finish(f"{material.name}, volume")
 
     def light(self, light) -> Program:
         """The emission of a lamp's node tree, to be multiplied with the lamp's own."""
@@ -162,7 +196,9 @@ class Compiler:
 class TreeWalker:
     """One program: follows links from the output node and lets rules emit instructions."""
 
-    def __init__(self, compiler: Compiler, who: str, owner):
+    def __init__(self, compiler: Compiler, who: str, owner, is_volume: bool = False):
+        self.is_volume = is_volume
+        self.has_surface = True
         self.compiler = compiler
         self.who = who
         self.owner = owner
@@ -186,7 +222,10 @@ class TreeWalker:
                     f"{self.who}: node '{self.name_of(output)}' moves the surface; its displacement is rendered as bump alone"
                 )
             NodeBuilder(self, context, output).bump_displacement()
-        self.warn_of_volume(context, output)
+        self.has_surface = self.resolve(context, output.inputs["Surface"]).node is not None
+        volume = output.inputs.get("Volume")
+        if not self.has_surface and volume is not None and self.resolve(context, volume).node is not None:
+            self.builder.op("transparent", 1.0, (1.0, 1.0, 1.0))
         self.closure_input(context, output.inputs["Surface"], self.builder.constant(1.0))
 
     def noted(self, program: Program) -> Program:

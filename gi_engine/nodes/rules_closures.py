@@ -1,7 +1,7 @@
 """Rules of the shader nodes: what they add to the surface, as closure ops. No bpy.
 
 Normal and Coat Normal that are not linked are the zero vector, which the ops take for the shading normal. What is not
-rendered (hair, volumes, ray portals) has its fallback and warning here.
+rendered (hair, ray portals) has its fallback and warning here.
 """
 
 from __future__ import annotations
@@ -296,13 +296,3 @@ def ray_portal(b, weight):
 @closure_rule("ShaderNodeEeveeSpecular")
 def eevee_specular(b, weight):
     b.warn("for EEVEE alone; it renders black, as in Cycles")
-
-
-@closure_rule(
-    "ShaderNodeVolumeAbsorption",
-    "ShaderNodeVolumeScatter",
-    "ShaderNodeVolumePrincipled",
-    "ShaderNodeVolumeCoefficients",
-)
-def volume(b, weight):
-    b.warn("volumes are not rendered yet; on a surface it renders black, as in Cycles")

@@ -189,7 +189,6 @@ def test_groups_and_muted_shaders(shader):
         ("ShaderNodeBsdfHairPrincipled", ["diffuse"]),
         ("ShaderNodeBsdfRayPortal", ["transparent"]),
         ("ShaderNodeVolumeScatter", []),
-        ("ShaderNodeVolumePrincipled", []),
     ],
 )
 def test_fallbacks_say_so_once(shader, idname, ops):

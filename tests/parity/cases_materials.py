@@ -2,7 +2,23 @@
 
 import math
 
-from .studio import LAMP, SKY, Case, ball, lamp, material, node, ortho_from_above, output, sheet, square, tree_of, world
+from .studio import (
+    LAMP,
+    SKY,
+    Case,
+    ball,
+    camera,
+    cube,
+    lamp,
+    material,
+    node,
+    ortho_from_above,
+    output,
+    sheet,
+    square,
+    tree_of,
+    world,
+)
 
 GLOSSY, GLASS, PRINCIPLED = "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfGlass", "ShaderNodeBsdfPrincipled"
 BRASS, RED = (0.9, 0.7, 0.4), (0.7, 0.2, 0.15)
@@ -131,6 +147,45 @@ def glossy_room(scene):
     ortho_from_above(3.0)
 
 
+def volume_of(kind, **inputs):
+    """A material that is nothing but its volume."""
+    from bpy import data
+
+    made = data.materials.new(kind)
+    tree = tree_of(made)
+    out = tree.nodes.new("ShaderNodeOutputMaterial")
+    filled = node(tree, kind, None, {name.replace("_", " "): value for name, value in inputs.items()})
+    tree.links.new(filled.outputs[0], out.inputs["Volume"])
+    return made
+
+
+def fog(scene):
+    """The camera stands in a mist that holds a glass ball, a denser ball and lamps."""
+    mist = cube(volume_of("ShaderNodeVolumeScatter", Color=(0.7, 0.8, 0.9), Density=0.12, Anisotropy=0.3), 6.0)
+    mist.name = "mist"
+    square(material("floor", "ShaderNodeBsdfDiffuse", Color=(0.6, 0.5, 0.4)), 3.0)
+    ball(CLEAR["glass 0"]("glass"), 0.5, location=(-0.6, 0.0, 0.5))
+    ball(volume_of("ShaderNodeVolumePrincipled", Color=RED, Density=3.0), 0.4, location=(0.7, 0.0, 0.5))
+    lamp("AREA", (1.0, 1.5, 3.0), (-0.4, 0.3, 0.0), 150.0, shape="SQUARE", size=1.0, color=LAMP)
+    lamp("POINT", (-1.5, -1.0, 1.0), energy=40.0, shadow_soft_size=0.2, visible=True)
+    camera((0, -4, 2.5), (0, 0, 0.4), 34.0)
+
+
+def skin_and_marble(scene):
+    """Light below surfaces: several kinds, bent normals, thin parts, an area lamp behind."""
+    square(material("floor", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5)), 3.0)
+    looks = {
+        "marble": principled(Base_Color=(0.9, 0.85, 0.8), Subsurface_Weight=1.0, Subsurface_Scale=0.3),
+        "jelly": of("ShaderNodeSubsurfaceScattering", {"falloff": "RANDOM_WALK"}, Color=RED, Scale=0.5, Anisotropy=0.6),
+        "skin": of("ShaderNodeSubsurfaceScattering", {"falloff": "RANDOM_WALK_SKIN"}, Color=(0.8, 0.5, 0.4), Scale=0.1),
+    }
+    for i, (name, look) in enumerate(looks.items()):
+        ball(look(name), 0.4, rings=16, location=(i - 1.0, 0.0, 0.4), scale=(1.0, 0.3, 1.0))
+    lamp("AREA", (0.0, 2.5, 1.0), (-1.4, 0.0, 0.0), 120.0, shape="SQUARE", size=1.0, color=LAMP)
+    world(SKY, 0.3)
+    camera((0, -4, 1.5), (0, 0, 0.4), 40.0)
+
+
 def no_material(scene):
     ball(None, 0.42, rings=32)
     light()
@@ -142,6 +197,9 @@ CASES = [
     sheet("closures", SIMPLE, small_ball, light),
     sheet("clear closures", CLEAR, small_ball, light, samples=128),
     sheet("principled", LAYERED, small_ball, light),
+    Case("fog", fog, samples=128, cycles={"volume_bounces": 0}),
+    Case("fog, scattered often", fog, samples=128, cycles={"volume_bounces": 4}),
+    Case("light below surfaces", skin_and_marble, samples=128),
     Case("filter glossy, little", glossy_room, samples=128, cycles={"blur_glossy": 0.1}),
     Case("filter glossy, as new files", glossy_room, samples=128, cycles={"blur_glossy": 1.0}),
 ]

@@ -228,6 +228,8 @@ MaterialData read_program(const Record& r) {
                                                                          {"FRONT_BACK", EmissionSampling::kFrontBack}});
   m.transparent_shadows = r.get<bool>("transparent_shadows");
   m.bump_correction = r.get<bool>("bump_correction");
+  m.volume = r.get<int>("volume");
+  m.only_volume = r.get<bool>("only_volume");
   return m;
 }
 

@@ -10,6 +10,7 @@ namespace {
 enum class DirectionSampling { kUniform, kCosine, kBsdf };
 enum class Continuation { kAlbedo, kThroughput, kConstant };
 
+constexpr uint32_t kWithin = 0x3ed1u;  // and of ways through media
 constexpr uint32_t kBelow = 0x50b5u;  // random numbers of walks below surfaces
 
 struct PathSettings {
@@ -68,7 +69,7 @@ class PathIntegrator final : public Integrator {
            p.real("continuation_constant"),
            p.integer("min_bounces"),
            {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
-            p.integer("transparent_bounces")},
+            p.integer("transparent_bounces"), p.integer("volume_bounces")},
            p.real("clamp_direct"),
            p.real("clamp_indirect"),
            no_caustics(p),
@@ -80,11 +81,61 @@ class PathIntegrator final : public Integrator {
   }
 
  private:
+  enum class MediumStep { kPasses, kScatters, kEnds };
+
+  // The way to the surface at `t_surface`, through what fills the place: what that emits, lamps seen through it, and maybe a scattering,
+  // from which the path goes on.
+  template <class Add>
+  MediumStep go_through(const RenderContext& context, const Media& media, CameraPath& path, float t_surface, LightSampling mode,
+                        uint32_t visibility, bool& may_scatter, const Sampler& sampler, uint32_t bounce, const Add& add) const {
+    const Scene& scene = context.scene;
+    const Vec3 wo = -path.ray.direction;
+    const Medium medium = media.at(scene, path.ray.origin, wo, path.state);
+    add(lamps_along(context, path.ray, t_surface, path.origin, mode, visibility, &medium), path.state.depth);
+    if (medium.empty()) return MediumStep::kPasses;
+    add(medium.emitted(std::min(t_surface, 1e30f)), path.state.depth);
+    Sampler random = sampler.fork(bounce + kWithin);
+    if (!may_scatter || !medium.scatters()) {
+      path.throughput *= medium.transmittance(t_surface);
+      return is_black(path.throughput) ? MediumStep::kEnds : MediumStep::kPasses;
+    }
+    const MediumEvent event = sample_distance(medium, t_surface, path.throughput, random.next_2d());
+    path.throughput *= event.weight;
+    if (is_black(path.throughput)) return MediumStep::kEnds;
+    if (!event.scattered) return MediumStep::kPasses;
+
+    // Scattered: lights first, then the next direction.
+    const Vec3 position = path.ray.origin + path.ray.direction * event.t;
+    path.travelled += event.t, path.seen_from_camera = false;
+    path.state.ray_length = event.t;
+    const LightQuery query{position, Vec3{}, true, path.state};
+    const float u_choice = random.next_1d(), u_lobe = random.next_1d();
+    const Vec2 u_light = random.next_2d(), u = random.next_2d();
+    add(sample_light_in_medium(context, medium, media, query, wo, mode, u_choice, u_light), path.state.depth + 1);
+    const auto next = medium.sample(wo, u, u_lobe);
+    if (!next || !(next->pdf_dir > 0.0f)) return MediumStep::kEnds;
+    const Rgb weight = next->value / next->pdf_dir;
+    path.throughput *= weight;
+    may_scatter = advance_in_medium(path.state, s_.limits);
+    path.origin = {query, next->pdf_dir};
+    path.ray = {position, next->wi, 0.0f, kInf};
+    const float alpha = continuation_probability(s_, path.state, path.throughput, Rgb(1.0f));
+    if (alpha < 1.0f) {
+      if (random.next_1d() >= alpha) return MediumStep::kEnds;
+      path.throughput *= 1.0f / alpha;
+    }
+    return MediumStep::kScatters;
+  }
+
   void trace(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler, PixelSample& result) const {
     const LightSampling mode = s_.light_sampling;
     Bsdf bsdf;
     bsdf.carry_subsurface(!context.lightmap);
     CameraPath path(camera);
+    Media media;  // that the path is in
+    const bool has_media = context.scene.has_volumes() && !context.lightmap;
+    if (has_media) media.begin_at(context.scene, path.ray.origin);
+    const Media* shading_media = has_media ? &media : nullptr;
     bool may_scatter = true;  // false past the bounce limit: the next surface only emits
 
     const int first_depth = context.lightmap ? context.lightmap->first_depth() : 0;
@@ -99,7 +150,14 @@ class PathIntegrator final : public Integrator {
       const auto hit = context.scene.intersect(path.ray, visibility);
 
       // Lamps do not block the ray.
-      add(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, mode, visibility), path.state.depth);
+      if (!media.empty()) {
+        const MediumStep step =
+            go_through(context, media, path, hit ? hit->t : path.ray.t_max, mode, visibility, may_scatter, sampler, bounce, add);
+        if (step == MediumStep::kEnds) break;
+        if (step == MediumStep::kScatters) continue;
+      } else {
+        add(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, mode, visibility), path.state.depth);
+      }
       if (!hit) {
         add(path.leave(context, film, mode, result), path.state.depth);
         break;
@@ -126,7 +184,7 @@ class PathIntegrator final : public Integrator {
         return s_.direction_sampling == DirectionSampling::kBsdf ? e.pdf_dir : pdf_direction(bsdf, point, s_.direction_sampling, wi);
       };
       if (may_scatter) {
-        add(sample_direct_light(context, point, bsdf, mode, u_light_choice, u_light, pdf_of), path.state.depth + 1);
+        add(sample_direct_light(context, point, bsdf, mode, u_light_choice, u_light, pdf_of, shading_media), path.state.depth + 1);
       }
 
       // Draw the next direction.
@@ -149,7 +207,7 @@ class PathIntegrator final : public Integrator {
         set_exit(*exit, bsdf);
         const float u_choice = below.next_1d(), u_exit = below.next_1d();
         const Vec2 u_to_light = below.next_2d(), u_out = below.next_2d();
-        add(sample_direct_light(context, point, bsdf, mode, u_choice, u_to_light, pdf_of), path.state.depth + 1);
+        add(sample_direct_light(context, point, bsdf, mode, u_choice, u_to_light, pdf_of, shading_media), path.state.depth + 1);
         next = sample_direction(bsdf, point, s_.direction_sampling, u_out, u_exit);
         if (!next || !(next->pdf_dir > 0.0f)) break;
         path.throughput *= next->value / next->pdf_dir;
@@ -157,8 +215,10 @@ class PathIntegrator final : public Integrator {
 
       // Follow it. A transparent surface changes nothing but the throughput: the ray goes on as the one it was.
       path.travelled += hit->t;
+      if (has_media && (next->flags & (kTransparent | kTransmission))) media.cross(context.scene, point, next->wi);
       if (transparent) {
-        if (!advance(path.state, next->flags, s_.limits)) break;
+        const bool is_there = !context.scene.material(context.scene.material_of(point.instance, point.triangle)).only_volume;
+        if (is_there && !advance(path.state, next->flags, s_.limits)) break;
         const float left = path.ray.t_max - hit->t;
         path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, left};
         path.origin.query.path = path.state;
@@ -237,6 +297,7 @@ const Descriptor& path_descriptor() {
           {"diffuse_bounces", "Diffuse", Kind::kInt, 4, 0, 1024, "Diffuse reflections"},
           {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},
           {"transmission_bounces", "Transmission", Kind::kInt, 12, 0, 1024, "Refractions"},
+          {"volume_bounces", "Volume", Kind::kInt, 0, 0, 1024, "Scatterings in volumes after the first"},
           {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
           {"clamp_direct", "Clamp Direct", Kind::kFloat, 0, 0, 1e9,
            "Largest radiance that one sample may add directly; 0 is off. Loses light"},
@@ -251,7 +312,7 @@ const Descriptor& path_descriptor() {
       /*bakes=*/true,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesSubsurface};
+      kCarriesSubsurface | kCarriesVolumes};
   return descriptor;
 }
 

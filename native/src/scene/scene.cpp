@@ -152,6 +152,8 @@ void Scene::build_accel(const std::string& embree, int threads) {
     }
     uint32_t mask = i.data->visibility & 0xffffu;
     if (transparent && (mask & kRayShadow)) mask = (mask & ~uint32_t(kRayShadow)) | kTransparentShadowBit, any_transparent_ = true;
+    for (const int program : i.data->materials)
+      if (data_.materials[size_t(program)].volume >= 0) mask |= kVolumeBit, has_volumes_ = true;
     placed.push_back({i.mesh, i.world_space ? nullptr : &i.to_world, mask});
   }
   accel_ = gi::build_accel(embree, std::move(meshes), std::move(placed), threads);
@@ -305,6 +307,11 @@ Rgb Scene::transparency(ShadingPoint& point) const {
   bsdf.clear(point.ng, point.ns);
   p.transparency_program().run(point, *resources_, &bsdf);
   return bsdf.transparency;
+}
+
+void Scene::add_medium(int m, ShadingPoint& point, Medium& medium) const {
+  const int volume = material(m).volume;
+  if (volume >= 0) material(volume).program.run(point, *resources_, nullptr, &medium);
 }
 
 Rgb Scene::world_radiance(Vec3 direction, const PathState& path) const {

@@ -50,6 +50,12 @@ class Scene {
   // Fraction of light that passes along a shadow ray: 0 or 1 for opaque scenes, programs decide for transparent surfaces.
   Rgb transmittance(const Ray& ray, const PathState& path) const;
 
+  // Surfaces of objects that are filled with something, along a ray: all of them, nearest first, whoever sees them.
+  bool has_volumes() const { return has_volumes_; }
+  void volume_hits(const Ray& ray, std::vector<Hit>& hits) const { accel_->all_hits(ray, kVolumeBit, hits); }
+  // Adds what fills an object of material `material` at `point`.
+  void add_medium(int material, ShadingPoint& point, Medium& medium) const;
+
   // What programs may ask. `ray` is the one that hit; `footprint` is the pixel's radius there, in metres.
   ShadingPoint shading_point(const Ray& ray, const Hit& hit, const PathState& path, float footprint = 0) const;
   // The point of triangle `triangle` at barycentrics (b1, b2), seen from direction `wo`: for light sampling and texels.
@@ -119,7 +125,8 @@ class Scene {
   std::unique_ptr<Accel> accel_;
   mutable std::array<RayCounter, kRayCounters> rays_;
   Bounds bounds_;
-  bool any_transparent_ = false;
+  bool any_transparent_ = false, has_volumes_ = false;
+  static constexpr uint32_t kVolumeBit = 1u << 17;  // what objects that are filled answer to
 };
 
 }  // namespace gi

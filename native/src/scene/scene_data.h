@@ -99,6 +99,8 @@ struct MaterialData {
   int pass_index = 0;
   EmissionSampling emission_sampling = EmissionSampling::kAuto;
   bool transparent_shadows = true, bump_correction = true;
+  int volume = -1;           // program of what fills objects of this material; -1: nothing
+  bool only_volume = false;  // its surface is not there
 };
 
 struct SceneData {

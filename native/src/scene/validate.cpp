@@ -113,6 +113,7 @@ void validate(SceneData& data, std::vector<std::string>& warnings) {
     }
     return false;
   });
+  for (const MaterialData& m : data.materials) check_program(data, m.volume, "the volume of '" + m.program.name() + "'", -1);
   std::erase_if(data.lamps, [&](const LampData& lamp) {
     check_program(data, lamp.program, "light '" + lamp.name + "'", -1);
     if (is_finite(lamp.matrix) && is_finite(lamp.color)) return false;

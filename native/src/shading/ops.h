@@ -15,5 +15,6 @@ std::span<const Op> ray_ops();
 std::span<const Op> texture_ops();
 std::span<const Op> closure_ops();
 std::span<const Op> principled_ops();
+std::span<const Op> volume_ops();
 
 }  // namespace gi

@@ -1,6 +1,7 @@
 // Ops that end a node tree: each adds lobes, emission, transparency or holdout to state.bsdf. The first input is always the
 // weight that Mix Shader leaves. A zero vector for a normal or a tangent means "not linked". Leaves out volumes and hair.
 #include "shading/closures.h"
+#include "shading/medium.h"
 #include "shading/ops.h"
 
 namespace gi {
@@ -12,7 +13,9 @@ void mix_weights(const Operands& o, ShadeState&) {
 }
 
 void emission(const Operands& o, ShadeState& s) {
-  if (s.bsdf) s.bsdf->emission += o.c(1) * (o.f(0) * o.f(2));
+  const Rgb light = o.c(1) * (o.f(0) * o.f(2));
+  if (s.bsdf) s.bsdf->emission += light;
+  if (s.medium) s.medium->emission += light;
 }
 
 void transparent(const Operands& o, ShadeState& s) {

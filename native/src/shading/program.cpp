@@ -70,10 +70,10 @@ std::vector<int32_t> Program::immediates(std::string_view name, int index) const
   return found;
 }
 
-void Program::run(ShadingPoint& point, const ShaderResources& resources, Bsdf* bsdf) const {
+void Program::run(ShadingPoint& point, const ShaderResources& resources, Bsdf* bsdf, Medium* medium) const {
   float registers[kMaxRegisters + 2];
   std::copy(constants_.begin(), constants_.end(), registers);
-  ShadeState state{point, resources, tables_.data(), bsdf};
+  ShadeState state{point, resources, tables_.data(), bsdf, medium};
   run_code(registers, state);
 }
 

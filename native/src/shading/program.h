@@ -18,6 +18,7 @@
 
 namespace gi {
 
+class Medium;
 struct ShaderResources;  // images and attribute tables that ops may read: see shading/resources.h
 
 // What one run of a program works on.
@@ -26,6 +27,7 @@ struct ShadeState {
   const ShaderResources& resources;
   const float* tables;               // the program's lookup tables (ramps, curves)
   Bsdf* bsdf;                        // where closures go; null when only values are wanted
+  Medium* medium = nullptr;          // where those of a volume go
 };
 
 // Access to one instruction's operands, in the order of its signature: outputs, inputs, immediates.
@@ -86,7 +88,7 @@ class Program {
   static constexpr int kMaxRegisters = 4096;       // after packing
   static constexpr int kMaxUnpacked = 1 << 20;
 
-  void run(ShadingPoint& point, const ShaderResources& resources, Bsdf* bsdf) const;
+  void run(ShadingPoint& point, const ShaderResources& resources, Bsdf* bsdf, Medium* medium = nullptr) const;
   int register_count() const { return register_count_; }
   // The part of the program that decides transparency (shadow rays), or emission (light sampling).
   const Program& transparency_program() const { return *transparency_; }

@@ -22,7 +22,7 @@ enum CausticFlags : uint8_t { kNoReflectiveCaustics = 1, kNoRefractiveCaustics =
 struct PathState {  // of the ray that arrived
   uint32_t kind = kRayCamera;
   // Small, since the state is copied at every bounce; Blender's limits end at 1024.
-  int16_t depth = 0, diffuse_depth = 0, glossy_depth = 0, transmission_depth = 0, transparent_depth = 0, portal_depth = 0;
+  int16_t depth = 0, diffuse_depth = 0, glossy_depth = 0, transmission_depth = 0, transparent_depth = 0, portal_depth = 0, volume_depth = 0;
   float ray_length = 0;
   uint8_t without = 0;  // CausticFlags: lobes that are left out at the next surface
   float least_pdf = 1e30f;  // of the directions so far, per steradian: how blurred the path's last surface is seen

@@ -6,7 +6,7 @@
 namespace gi {
 
 struct BounceLimits {
-  int total = 12, diffuse = 4, glossy = 4, transmission = 12, transparent = 8;
+  int total = 12, diffuse = 4, glossy = 4, transmission = 12, transparent = 8, volume = 0;
 };
 
 // The RayKind bits by which objects and lamps decide whether the ray sees them: reflection kinds do not hold for
@@ -32,6 +32,14 @@ inline bool advance(PathState& path, uint8_t flags, const BounceLimits& limits) 
   if (flags & kDiffuse) path.least_pdf = std::min(path.least_pdf, kInvPi);  // or less: where the density is not told
   path.kind |= flags & kDiffuse ? kRayDiffuse : flags & kGlossy ? kRayGlossy : uint32_t(kRayGlossy | kRaySingular);
   return within;
+}
+
+// The same for scattering in a medium.
+inline bool advance_in_medium(PathState& path, const BounceLimits& limits) {
+  path.kind = kRayVolume;
+  path.least_pdf = 0.0f;
+  const bool within = ++path.volume_depth <= limits.volume;
+  return ++path.depth <= limits.total && within;
 }
 
 // A point moved off its surface to the side that `direction` leaves by, far enough not to meet it again.

@@ -1,0 +1,87 @@
+// What fills a volume at one place: how much it takes, scatters and emits per metre, and how it scatters.
+// Directions point away from the place, as at surfaces. Leaves out where media are (transport/media.h).
+#pragma once
+#include <optional>
+
+#include "shading/lobes/lobe.h"
+#include "shading/phase.h"
+
+namespace gi {
+
+class Medium {
+ public:
+  Rgb sigma_t, emission;  // per metre; radiance per metre
+
+  // Takes `sigma_s` out of the beam and scatters it by Draine's phase function. What comes after the fourth is scattered as the fourth.
+  void add_scattering(Rgb sigma_s, float g, float alpha) {
+    sigma_s = positive(sigma_s);
+    sigma_t += sigma_s;
+    if (is_black(sigma_s)) return;
+    if (count_ == kMost) return void(lobes_[kMost - 1].sigma_s += sigma_s);
+    lobes_[count_++] = {sigma_s, std::clamp(g, -0.999f, 0.999f), std::max(alpha, 0.0f)};
+  }
+  void add_absorption(Rgb sigma_a) { sigma_t += positive(sigma_a); }
+  bool scatters() const { return count_ > 0; }
+  bool empty() const { return is_black(sigma_t) && is_black(emission); }
+
+  Rgb transmittance(float t) const {
+    Rgb passed;
+    for (int i = 0; i < 3; ++i) passed[i] = sigma_t[i] > 0.0f ? std::exp(-sigma_t[i] * t) : 1.0f;
+    return passed;
+  }
+  // What is emitted along a way of length t, as it arrives at its beginning.
+  Rgb emitted(float t) const {
+    Rgb sum;
+    for (int i = 0; i < 3; ++i) {
+      if (emission[i] <= 0.0f) continue;
+      const float depth = sigma_t[i] * t;
+      sum[i] = emission[i] * (depth > 1e-4f ? -std::expm1(-depth) / sigma_t[i] : t * (1.0f - 0.5f * depth));
+    }
+    return sum;
+  }
+
+  // Σ σs p over the phase functions, per metre and steradian; the density is that of `sample`.
+  LobeEval eval(Vec3 wo, Vec3 wi) const {
+    LobeEval e;
+    const float cosine = -dot(wo, wi), all = total();
+    for (int i = 0; i < count_; ++i) {
+      const Lobe& l = lobes_[i];
+      e.value += l.sigma_s * draine(cosine, l.g, l.alpha);
+      e.pdf_dir += average(l.sigma_s) / all * drawn(cosine, l);
+    }
+    return e;
+  }
+  std::optional<LobeSample> sample(Vec3 wo, Vec2 u, float u_lobe) const {
+    float left = u_lobe * total();
+    for (int i = 0; i < count_; ++i) {
+      const Lobe& l = lobes_[i];
+      left -= average(l.sigma_s);
+      if (left > 0.0f && i + 1 < count_) continue;
+      const bool flat = is_flat(l);
+      const Vec3 wi = sample_henyey_greenstein(-wo, flat ? 0.0f : l.g, u);
+      const LobeEval e = eval(wo, wi);
+      return LobeSample{wi, e.value, e.pdf_dir, 0, 1.0f};
+    }
+    return {};
+  }
+
+ private:
+  struct Lobe {
+    Rgb sigma_s;
+    float g, alpha;
+  };
+  static constexpr int kMost = 4;
+  // Henyey and Greenstein's part is drawn; where there is little of it, all directions alike.
+  static bool is_flat(const Lobe& l) { return std::abs(l.g) < 0.05f; }
+  static float drawn(float cosine, const Lobe& l) { return henyey_greenstein(cosine, is_flat(l) ? 0.0f : l.g); }
+  float total() const {
+    float sum = 0.0f;
+    for (int i = 0; i < count_; ++i) sum += average(lobes_[i].sigma_s);
+    return sum;
+  }
+
+  Lobe lobes_[kMost];
+  int count_ = 0;
+};
+
+}  // namespace gi
