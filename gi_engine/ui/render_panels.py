@@ -14,6 +14,7 @@ BOUNCES = (
     "diffuse_bounces",
     "glossy_bounces",
     "transmission_bounces",
+    "volume_bounces",
     "transparent_bounces",
     "min_bounces",
 )

@@ -99,7 +99,8 @@ def test_panels_draw_what_exists(scene, own):
         items.append(add(scene, kind, with_nodes(bpy.data.lights.new(kind, kind))))
     drawn = {panel: [name for i in items for name in draw(panel, context_of(i))] for panel in PANELS}
     silent = [p.__name__ for p, names in drawn.items() if not names]
-    assert silent == ["GI_RENDER_PT_light_paths"]  # a title over its parts
+    # A title over its parts, and one that shows only what a render has found.
+    assert silent == ["GI_RENDER_PT_light_paths", "GI_MATERIAL_PT_approximated"]
     assert "samples" in drawn[render_panels.GI_RENDER_PT_sampling]
     assert {"size", "spread", "spot_size", "angle"} <= set(drawn[object_panels.GI_LIGHT_PT_light])
 
