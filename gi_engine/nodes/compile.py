@@ -45,6 +45,8 @@ VARIES_IN_SPACE = frozenset(
         "incoming",
     }
 )
+COMBINING = {"ShaderNodeMixShader", "ShaderNodeAddShader"}
+MOST_CLOSURES = 24  # Bsdf::kMaxLobes
 AS_CYCLES = "as in Cycles"
 NUMBERED = re.compile(r"^\d+_")
 DEEPEST = 20000  # Python's recursion limit while a tree is compiled: some frames for each node of a chain
@@ -206,6 +208,7 @@ class TreeWalker:
         self.tree = self.inlined.node_tree if self.inlined else owner.node_tree
         self.builder = ProgramBuilder()
         self.outputs: list[dict] = [{}]  # outputs of nodes by (context, node), innermost scope last
+        self.closures = 0
         self.active: list[tuple] = []  # nodes being compiled, to find cycles
         self.needs: set[str] = set()  # what an integrator has to carry
         self.approximated: dict[str, str] = {}  # what is rendered as something else, by node
@@ -375,6 +378,11 @@ class TreeWalker:
             self.compiler.warn(f"{self.who}: node '{self.name_of(node)}' is part of a cycle and is left out there")
         else:
             self.active.append(key)
+            self.closures += node.bl_idname not in COMBINING
+            if self.closures == MOST_CLOSURES + 1:
+                self.compiler.warn(
+                    f"{self.who} has more than {MOST_CLOSURES} closures; of those that show in one place the first count"
+                )
             rule(NodeBuilder(self, source.context, node), weight)
             self.active.pop()
 
