@@ -96,9 +96,34 @@ def parser(commands_by_name: dict, in_blender: bool) -> argparse.ArgumentParser:
     integrators = commands.add_parser("integrators", help="list the integrators and their parameters")
     integrators.set_defaults(command=commands_by_name["integrators"])
     others = compare_arguments.add_commands(commands, commands_by_name, file, sys.modules[__name__])
+    if not in_blender:
+        others.append(add_package(commands, commands_by_name))
     for command in (render, bake, info, integrators, *others):
         command.add_argument("-v", "--verbose", action="store_true", help="show what Blender prints")
     return program
+
+
+def add_package(commands, commands_by_name: dict):
+    command = commands.add_parser("package", help="make the extension's zip for Blender, from a checkout")
+    command.add_argument(
+        "-o", "--output", type=Path, default=Path("dist"), metavar="DIR", help="the folder of the zip; default: dist"
+    )
+    command.add_argument(
+        "--wheel",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="WHEEL",
+        help="the compiled part, made elsewhere; may be repeated, a zip is made for each platform; default: compile it here",
+    )
+    command.add_argument(
+        "--compiler",
+        choices=("zig", "system"),
+        default="zig",
+        help="zig makes what runs on old systems too; the system's compiler what runs on systems as new as this one",
+    )
+    command.set_defaults(command=commands_by_name["package"])
+    return command
 
 
 def add_sampling(command) -> None:

@@ -332,6 +332,18 @@ def parity_command(arguments, out, err) -> int:
     return parity_command(arguments, out, err)
 
 
+def package_command(arguments, out, err) -> int:
+    from .package.assemble import package
+    from .package.wheels import WheelError
+
+    try:
+        for path in package(arguments.output, arguments.wheel, arguments.compiler, lambda text: print(text, file=err)):
+            print(f"{path}: {path.stat().st_size / 2**20:.1f} MiB", file=out)
+    except WheelError as error:
+        raise RenderError(str(error)) from error
+    return DONE
+
+
 COMMANDS = {
     "render": render_command,
     "bake": bake_command,
@@ -340,6 +352,7 @@ COMMANDS = {
     "compare": compare_command,
     "series": series_command,
     "parity": parity_command,
+    "package": package_command,
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
 import time
@@ -11,7 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import control, native
+from . import control, native, viewport
 from .bake import BakeError, bake_for_blender, blender_folders
 from .denoise import denoise
 from .display import duration
@@ -53,6 +54,7 @@ class GIEngine(bpy.types.RenderEngine):
     exported: Exported | None = None
     failure: Exception | None = None
     next_status: float = 0.0
+    viewport: viewport.Viewport | None = None
 
     def update(self, data=None, depsgraph=None):
         # Blender holds still here (under its draw lock), so here is where the scene is read.
@@ -233,6 +235,26 @@ class GIEngine(bpy.types.RenderEngine):
             self.error_set(message)
         self.report({"ERROR"}, message)
 
+    def view_update(self, context, depsgraph):
+        try:
+            self.viewport = self.viewport or viewport.Viewport(self)
+            self.viewport.update(context, depsgraph)
+        except Exception as error:
+            self.update_stats("", describe(error))
+
+    def view_draw(self, context, depsgraph):
+        try:
+            self.viewport = self.viewport or viewport.Viewport(self)
+            self.viewport.draw(self, context, depsgraph)
+        except Exception as error:
+            self.update_stats("", describe(error))
+
+    def __del__(self):
+        if self.viewport:
+            self.viewport.close()
+        with contextlib.suppress(AttributeError):  # not every version has one
+            super().__del__()
+
     def bake(self, depsgraph, obj, pass_type, pass_filter, width, height):
         """Blender's own Bake button, once for each object and image. The active UV map is the one it bakes to."""
         _running.append("bake")
@@ -318,6 +340,7 @@ def stop_renders() -> None:
 
 def register() -> None:
     _leaving.clear()
+    viewport.register()
     bpy.utils.register_class(GIEngine)
     for handlers in HANDLERS:
         handlers.append(forget)
@@ -325,6 +348,7 @@ def register() -> None:
 
 def unregister() -> None:
     stop_renders()
+    viewport.unregister()
     for handlers in HANDLERS:
         handlers.remove(forget)
     bpy.utils.unregister_class(GIEngine)

@@ -135,6 +135,42 @@ def denoising_properties() -> dict:
     }
 
 
+VIEWED = (
+    ("Combined", "Combined", "The picture"),
+    ("Depth", "Depth", "Distance from the camera, in metres"),
+    ("Position", "Position", "Where the surface lies, in metres"),
+    ("Normal", "Normal", "Where the surface faces"),
+    ("Denoising Albedo", "Albedo", "Share of light that the surface reflects or transmits"),
+    ("Cache Samples", "Cache Samples", "Irradiance caching: where the records lie"),
+    ("Photon Density", "Photon Density", "Photon mapping: photons on a square metre"),
+)
+
+
+def viewport_properties() -> dict:
+    return {
+        "preview_samples": IntProperty(
+            name="Viewport Samples",
+            description="Samples of each pixel in the viewport; 0 for no end",
+            default=32,
+            min=0,
+        ),
+        "preview_pause": BoolProperty(name="Pause Preview", description="Leaves the viewport as it is"),
+        "viewport_pass": EnumProperty(name="Pass", description="What the viewport shows", items=VIEWED),
+        "use_preview_denoising": BoolProperty(
+            name="Denoise Viewport", description="Takes the noise out of the viewport's picture, again and again"
+        ),
+        "preview_denoising_input_passes": EnumProperty(
+            name="Passes", description="What guides the denoiser", items=INPUTS, default="RGB_ALBEDO"
+        ),
+        "preview_denoising_quality": EnumProperty(
+            name="Quality", description="Slower is better", items=QUALITY, default="FAST"
+        ),
+        "preview_denoising_start_sample": IntProperty(
+            name="Start Sample", description="The first sample whose picture is denoised", default=1, min=1
+        ),
+    }
+
+
 def property_of(parameter: dict):
     """A bpy property for one parameter of a descriptor."""
     options = {"name": parameter["label"], "description": parameter.get("help", ""), "default": parameter["default"]}
@@ -161,7 +197,7 @@ def integrator_group(descriptor: dict) -> type:
 def settings_group(descriptors: list[dict], groups: dict[str, type], compared: type) -> type:
     items = [(d["id"], d["label"], d.get("blurb", "")) for d in descriptors] or [("path", "Path tracing", "")]
     default = next((item[0] for item in items if item[0] == "path"), items[0][0])
-    annotations = fixed_properties() | denoising_properties()
+    annotations = fixed_properties() | denoising_properties() | viewport_properties()
     annotations["integrator"] = EnumProperty(
         name="Integrator", items=items, default=default, description="How light is followed"
     )

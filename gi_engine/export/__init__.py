@@ -42,29 +42,38 @@ class ExportError(ValueError):
 
 
 def export(
-    depsgraph, descriptors: list[dict], engine=None, size=None, integrator: str | None = None, lightmap: str = ""
+    depsgraph,
+    descriptors: list[dict],
+    engine=None,
+    size=None,
+    integrator: str | None = None,
+    lightmap: str = "",
+    known=None,
+    view=None,
+    needs_camera: bool = True,
 ) -> Exported:
     """`descriptors`: the integrators'. `engine`: the RenderEngine, where there is one (stereo, camera override).
 
     `size` is the full frame's in pixels; by default the scene's. `integrator` overrides the scene's.
-    `lightmap`: the UV map that a bake is for; it needs no camera.
+    `lightmap`: the UV map that a bake is for; it needs no camera. Of a viewport: `known` meshes (sync.py) are not read again, and
+    only what the 3D viewport `view` shows is taken.
     """
     warnings = Warnings()
     scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer_eval
     width, height = size or frame_size(scene.render)
     out = Scene()
-    if lightmap and not scene.camera:
+    if (lightmap or not needs_camera) and not scene.camera:
         out.camera = Camera("none", "ORTHO", np.eye(4, dtype=np.float32))
     else:
         out.camera = export_active_camera(engine, depsgraph, width, height, warnings)
     out.film = export_film(scene, view_layer, resolve(scene, view_layer), (width, height))
-    found = collect(depsgraph, warnings)
+    found = collect(depsgraph, warnings, view)
     shaders = Shaders(out, depsgraph, warnings)
     world = (getattr(view_layer, "world_override", None) or scene.world) if view_layer.use_sky else None
     out.world = export_world(world, shaders.world(world) if world else -1)
     export_lights(out, found, shaders, warnings)
     if view_layer.use_solid:
-        export_objects(out, found, depsgraph, shaders, warnings, {lightmap} - {""})
+        export_objects(out, found, depsgraph, shaders, warnings, {lightmap} - {""}, known)
     if scene.render.use_motion_blur:
         warnings.add("motion blur is not supported yet; rendered without")
     release_scratch()
@@ -104,7 +113,7 @@ def export_lights(out: Scene, found: Collected, shaders: Shaders, warnings: Warn
 
 
 def export_objects(
-    out: Scene, found: Collected, depsgraph, shaders: Shaders, warnings: Warnings, attributes: set[str]
+    out: Scene, found: Collected, depsgraph, shaders: Shaders, warnings: Warnings, attributes: set[str], known=None
 ) -> None:
     # Programs first: they say which attributes the meshes have to bring.
     slots = [shaders.slots(prototype.materials) for prototype in found.prototypes]
@@ -115,16 +124,19 @@ def export_objects(
     for prototype in found.prototypes:
         key = prototype.mesh.as_pointer()
         if key not in index_of:
-            index_of[key] = add_mesh(out, prototype, wanted, warnings)
+            index_of[key] = add_mesh(out, prototype, wanted, warnings, known)
     meshes = [index_of[prototype.mesh.as_pointer()] for prototype in found.prototypes]
     values = [shaders.object_attributes(prototype) for prototype in found.prototypes]
-    for known, own in zip(values, read_places(depsgraph, found.prototypes, wanted), strict=True):
-        known.update(own)
+    for value, own in zip(values, read_places(depsgraph, found.prototypes, wanted), strict=True):
+        value.update(own)
     out.instances = place(found, meshes, slots, values, warnings)
 
 
-def add_mesh(out: Scene, prototype, wanted: set[str], warnings: Warnings) -> int | None:
-    mesh = export_mesh(prototype.mesh, prototype.name, wanted, prototype.is_deformed)
+def add_mesh(out: Scene, prototype, wanted: set[str], warnings: Warnings, known=None) -> int | None:
+    def read():
+        return export_mesh(prototype.mesh, prototype.name, wanted, prototype.is_deformed)
+
+    mesh = known.read(prototype, wanted, read) if known else read()
     if mesh is None:
         # Instancers and curves without a fill have no faces on purpose.
         if prototype.is_plain:

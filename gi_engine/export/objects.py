@@ -74,9 +74,9 @@ class Collected:
     lights: list[tuple] = field(default_factory=list)  # name, bpy Light, matrix, visibility
 
 
-def collect(depsgraph, warnings: Warnings) -> Collected:
+def collect(depsgraph, warnings: Warnings, view=None) -> Collected:
     """Goes through all instances once. Never leaves the loop early: older versions then leak the whole list."""
-    walk = Walk(depsgraph.view_layer_eval, warnings)
+    walk = Walk(depsgraph.view_layer_eval, warnings, view)
     seen: dict[tuple, tuple] = {}
     # Data that gives nothing: that of empties, and of curves (which come as meshes, too).
     ignored: dict[int, object] = {id(None): None}
@@ -95,19 +95,24 @@ def collect(depsgraph, warnings: Warnings) -> Collected:
         elif isinstance(data, IGNORED):
             ignored[id(data)] = data
         elif instance.show_self:
-            adders = walk.visit(instance)
+            adders = walk.visit(instance) if walk.is_shown(instance) else ()
             if lasting is not None and adders is not None:
                 seen[key] = (adders, lasting, parent, data)
     return walk.found
 
 
 class Walk:
-    def __init__(self, view_layer, warnings: Warnings):
+    def __init__(self, view_layer, warnings: Warnings, view=None):
         self.view_layer = view_layer
+        self.view = view
         self.warnings = warnings
         self.found = Collected()
         # What takes the matrix and the number of further instances, by mesh, object and instancer.
         self.known: dict[tuple, tuple] = {}
+
+    def is_shown(self, instance) -> bool:
+        """Local view and collections that one viewport hides: by the object, or by what makes duplicates of it."""
+        return self.view is None or (instance.parent or instance.object).visible_in_viewport_get(self.view)
 
     def visit(self, instance) -> tuple | None:
         """What takes the matrix and the number of further instances; () if nothing does, None if visit() wants them."""

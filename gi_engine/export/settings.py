@@ -15,6 +15,8 @@ from .ids import MASK, hash_words
 SHARED = {
     "samples": "samples",
     "time_limit": "time_limit",
+    "preview_samples": "preview_samples",
+    "preview_pause": "preview_pause",
     "seed": "seed",
     "use_animated_seed": "use_animated_seed",
     "film_exposure": "film_exposure",

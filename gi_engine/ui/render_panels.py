@@ -107,6 +107,25 @@ class GI_RENDER_PT_sampling(RenderPanel, bpy.types.Panel):
             column.operator("gi_engine.copy_from_cycles", text="Make Own Settings")
 
 
+class GI_RENDER_PT_viewport(RenderPanel, bpy.types.Panel):
+    bl_label = "Viewport"
+    bl_parent_id = "GI_RENDER_PT_sampling"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        scene, own = context.scene, context.scene.gi_engine
+        column = columns(self.layout)
+        row = column.row(align=True)
+        setting(row, scene, "preview_samples", text="Samples")
+        setting(row, scene, "preview_pause", text="", icon="PAUSE")
+        column.prop(own, "viewport_pass")
+        column.prop(own, "use_preview_denoising", text="Denoise")
+        column = columns(self.layout)
+        column.active = own.use_preview_denoising
+        for name in ("preview_denoising_input_passes", "preview_denoising_quality", "preview_denoising_start_sample"):
+            column.prop(own, name)
+
+
 class GI_RENDER_PT_denoise(RenderPanel, bpy.types.Panel):
     bl_label = "Denoise"
     bl_parent_id = "GI_RENDER_PT_sampling"
@@ -294,6 +313,7 @@ CLASSES = (
     GI_RENDER_PT_integrator,
     GI_RENDER_PT_cache,
     GI_RENDER_PT_sampling,
+    GI_RENDER_PT_viewport,
     GI_RENDER_PT_denoise,
     GI_RENDER_PT_light_paths,
     GI_RENDER_PT_bounces,
