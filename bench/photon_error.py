@@ -41,7 +41,7 @@ def main() -> None:
     by_count, by_radius = {}, {}
     for photons in PHOTONS:
         for count in NEIGHBOURS:
-            sent = {"global_photons": photons, "caustic_photons": photons, "gather": False}
+            sent = {"global_photons": photons, "caustic_photons": photons, "global_light": "PHOTONS"}
             far = {"global_count": count, "caustic_count": count, "radius": 1000}
             by_count[count, photons] = measured("photon_map", 8, **sent, **far)
             print(f"{photons:9,} photons, {count:4} neighbours {100 * by_count[count, photons]:.2f} %", flush=True)

@@ -35,7 +35,7 @@ def sent(exported, threads: int, count: int) -> dict:
     """Figures of a map of `count` light paths' global photons, the median run."""
     settings = exported.settings
     settings.integrator, settings.samples, settings.threads = "photon_map", 1, threads
-    settings.parameters = {"global_photons": count, "caustic_photons": 1, "gather": False}
+    settings.parameters = {"global_photons": count, "caustic_photons": 1, "global_light": "PHOTONS"}
     runs = []
     for _ in range(ROUNDS):
         with Session(exported.scene, settings) as session:

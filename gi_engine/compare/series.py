@@ -1,23 +1,19 @@
-"""The classic figure: ray tracing, soft shadows, caustics from photons, global illumination, and a path traced reference, each as EXR and all
-on one labelled sheet [Jensen 1996, fig. 6; Jensen 2001]. What fails leaves its place empty; the others stay."""
+"""The classic figure: ray tracing, soft shadows, caustics from photons, global illumination, and a path traced reference, each as EXR and
+all on one labelled sheet [Jensen 1996, fig. 6; Jensen 2001]. What fails leaves its place empty; the others stay."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from ..output import Target
-from . import pictures
 from .child import Child, ChildFailed
-from .pictures import PictureError
 from .plan import Plan
 from .reference import TIMES
 from .runner import Watcher
 
-TERMS = ("Direct", "Specular", "Caustic")  # of photon mapping, without light between diffuse surfaces
 SHEET = "series.png"
 CAPTION, EDGE = 0.09, 0.012  # of a picture's height; of its width
 PAPER, INK, EMPTY = (255, 255, 255), (20, 20, 20), (200, 200, 200)
@@ -28,7 +24,7 @@ class Step:
     name: str  # of its files
     caption: str
     engine: str
-    terms: tuple[str, ...] = ()  # what it is the sum of; none: the whole picture
+    parameters: dict = field(default_factory=dict)
     error: str = ""
     shown: np.ndarray | None = None  # (height, width, 3) of 0 to 1, through the view transform
 
@@ -37,8 +33,8 @@ def steps() -> list[Step]:
     return [
         Step("ray_tracing", "Ray tracing", "whitted"),
         Step("soft_shadows", "+ soft shadows", "distributed"),
-        Step("caustics", "+ caustics", "photon_map", TERMS),
-        Step("global_illumination", "+ global illumination", "photon_map"),
+        Step("caustics", "+ caustics", "photon_map", {"global_light": "NONE"}),
+        Step("global_illumination", "+ global illumination", "photon_map", {"global_light": "CACHED"}),
         Step("reference", "Path traced reference", "path"),
     ]
 
@@ -47,57 +43,39 @@ def series(plan: Plan, watcher: Watcher) -> list[Step]:
     """Renders into plan.output. Raises Cancelled; what was finished is there then."""
     made = steps()
     try:
-        for number, (engine, group) in enumerate(by_engine(made)):
-            render_group(plan, watcher, engine, group, number / 4)
+        for number, step in enumerate(made):
+            watcher.progress(number / len(made), f"{step.caption}: …")
+            try:
+                render_step(plan, watcher, step, number / len(made))
+            except (ChildFailed, OSError) as error:
+                step.error = str(error)
+                watcher.say(f"{step.caption} failed: {error}")
     finally:
         write_sheet(made, plan.output / SHEET)
     return made
 
 
-def by_engine(made: list[Step]) -> Iterator[tuple[str, list[Step]]]:
-    for engine in dict.fromkeys(step.engine for step in made):
-        yield engine, [step for step in made if step.engine == engine]
-
-
-def render_group(plan: Plan, watcher: Watcher, engine: str, group: list[Step], before: float) -> None:
-    """Steps that come out of one render."""
-    caption = group[-1].caption
-    times = TIMES if group[-1].name == "reference" else 1
+def render_step(plan: Plan, watcher: Watcher, step: Step, before: float) -> None:
+    """Its picture as EXR, and as it is shown."""
+    times = TIMES if step.name == "reference" else 1
     limits = {"seconds": times * plan.seconds, "samples": times * plan.samples}
-    if group[-1].name == "reference" and (plan.reference_seconds or plan.reference_samples):
+    if step.name == "reference" and (plan.reference_seconds or plan.reference_samples):
         limits = {"seconds": plan.reference_seconds, "samples": plan.reference_samples}
-    watcher.progress(before, f"{caption}: …")
-    path = (plan.output / f"{group[-1].name}.exr").resolve()
-    terms = any(step.terms for step in group)
-    try:
-        with Child(watcher.stopped) as child:
-            child.ask("open", file=str(plan.file.resolve()), engine=engine, view=plan.view())
-            child.ask(
-                "render",
-                plan.limit + 4 * limits["seconds"],
-                lambda said: watcher.progress(before, f"{caption}: {said['samples']} samples"),
-                path=str(path),
-                seed=1,
-                passes=terms,
-                terms=terms,
-                **limits,
-            )
-            for step in group:
-                take(child, step, path)
-    except (ChildFailed, PictureError, OSError) as error:
-        for step in group:
-            step.error = step.error or str(error)
-            watcher.say(f"{step.caption} failed: {error}")
-
-
-def take(child: Child, step: Step, path: Path) -> None:
-    """The step's picture as EXR, and as it is shown."""
-    source = path.with_name(f"{step.name}.exr")
-    if step.terms:
-        passes = pictures.read_passes(path.with_name(path.stem + "_passes.exr"))
-        pictures.write_exr(source, sum(passes[term] for term in step.terms))
-    target = source.with_suffix(".png")
-    child.ask("show", source=str(source), target=str(target))
+    path = (plan.output / f"{step.name}.exr").resolve()
+    with Child(watcher.stopped) as child:
+        child.ask("open", file=str(plan.file.resolve()), engine=step.engine, view=plan.view())
+        child.ask(
+            "render",
+            plan.limit + 4 * limits["seconds"],
+            lambda said: watcher.progress(before, f"{step.caption}: {said['samples']} samples"),
+            path=str(path),
+            seed=1,
+            passes=False,
+            parameters=step.parameters,
+            **limits,
+        )
+        target = path.with_suffix(".png")
+        child.ask("show", source=str(path), target=str(target))
     shown = target.with_suffix(".npy")
     step.shown = np.load(shown)
     shown.unlink()

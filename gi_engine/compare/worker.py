@@ -138,15 +138,15 @@ def neutralize(cycles) -> None:
         lamp.cycles.is_caustics_light = False  # manifold walks: too dark beside caustics
 
 
-def render(state: State, path: str, seed: int, samples: int, seconds: float, passes: bool, terms: bool = False) -> dict:
-    """One picture into `path` (.exr: the combined pass), every pass into `path` with "_passes" if asked for; `terms`: those of photon
-    mapping too."""
+def render(
+    state: State, path: str, seed: int, samples: int, seconds: float, passes: bool, parameters: dict | None = None
+) -> dict:
+    """One picture into `path` (.exr: the combined pass), every pass into `path` with "_passes" if asked for; `parameters`: of the
+    integrator, by name, over the scene's."""
     scene = bpy.context.scene
-    for layer in scene.view_layers:
-        layer.gi_engine.use_pass_terms = layer.gi_engine.use_pass_terms or terms
     state.samples, state.marks = 0, {}
     before = memory_now()
-    wishes = Control(on_progress=state.on_progress)
+    wishes = Control(on_progress=state.on_progress, parameters=parameters or {})
     if state.engine == "cycles":
         scene.cycles.samples, scene.cycles.time_limit = samples or UNLIMITED, seconds
         scene.cycles.seed = seed

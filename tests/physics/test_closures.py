@@ -194,7 +194,8 @@ def stack_layers(b, **changes):
     specular = p["roughness"], p["ior"], p["specular"], p["specular_tint"]
     below = b.op("specular_layer", below, unlinked, *specular, *brushed, *film, imm=imm)
     base = p["base_color"], p["diffuse_roughness"], p["subsurface"], p["subsurface_anisotropy"], p["thin_wall"]
-    b.op("base_layer", below, unlinked, *base)
+    below_skin = (1, 1, 1), 0.0, p["roughness"], p["ior"], p["specular"], 1.4
+    b.op("base_layer", below, unlinked, *base, *below_skin, imm=(0,))
 
 
 @pytest.mark.parametrize("cos_o", [1.0, 0.6, 0.15])

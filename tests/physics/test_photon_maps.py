@@ -35,8 +35,8 @@ def test_a_closed_box_holds_all_power(albedo):
     """Each bounce leaves what came, and sends on its share: P Σ ρⁱ. Of those, what has met no surface yet is direct."""
     scene = scene_of((cube(), surface(albedo)), lights=[lamp("POINT", (12.0,) * 3, matrix=matrix((0.2, 0.1, -0.3)))])
     bounces = {"max_bounces": 4, "diffuse_bounces": 4, "caustic_photons": 100}
-    for gather, first in ((True, 0), (False, 1)):
-        photons = {"global_photons": 100_000, "gather": gather}
+    for way, first in (("GATHERED", 0), ("PHOTONS", 1)):
+        photons = {"global_photons": 100_000, "global_light": way}
         _, kept = render("photon_map", scene, (0, 0, 0), (0, 0, -1), 0.1, **photons, **bounces)
         truth = 12 * sum(albedo**i for i in range(first, 5))
         assert power_of(kept["global"]) == pytest.approx(truth, rel=0.01, abs=1e-9)
@@ -68,9 +68,9 @@ def bowl(top):
     )
 
 
-@pytest.mark.parametrize("gather", [True, False])
+@pytest.mark.parametrize("way", ["GATHERED", "CACHED", "PHOTONS"])
 @pytest.mark.parametrize("away", [0.5, 0.02])
-def test_borders_are_as_bright_as_the_middle(away, gather):
+def test_borders_are_as_bright_as_the_middle(away, way):
     """A bowl cut from a sphere with a lamp in its middle is lit evenly up to its rim: each of its points sees all others alike."""
     top = 0.75 * math.pi
     truth = 0.5 / (1 - 0.5 * (1 - math.cos(top)) / 2)
@@ -86,7 +86,7 @@ def test_borders_are_as_bright_as_the_middle(away, gather):
             seed=seed,
             samples=8,
             global_photons=50_000,
-            gather=gather,
+            global_light=way,
         )[0].mean()
         for seed in range(1, 9)
     ]

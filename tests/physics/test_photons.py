@@ -64,8 +64,12 @@ def shoot(integrator, scene, position, direction, samples=16, pixels=16, width=0
 
 WAYS = {
     "progressive": ("sppm", {"photons": 20_000, "radius": 40}),
-    "gathered": ("photon_map", {"global_photons": 50_000, "caustic_photons": 50_000}),
-    "read directly": ("photon_map", {"global_photons": 50_000, "caustic_photons": 50_000, "gather": False}),
+    "gathered": ("photon_map", {"global_photons": 50_000, "caustic_photons": 50_000, "global_light": "GATHERED"}),
+    "cached": (
+        "photon_map",
+        {"global_photons": 50_000, "caustic_photons": 50_000, "global_light": "CACHED", "record_error": 0.1},
+    ),
+    "read directly": ("photon_map", {"global_photons": 50_000, "caustic_photons": 50_000, "global_light": "PHOTONS"}),
 }
 
 
@@ -165,7 +169,7 @@ ALIKE = {
 
 
 @pytest.mark.parametrize("name", [name for name in SCENES | CAUSTICS if name not in ALIKE])
-@pytest.mark.parametrize("way", ["progressive", "gathered"])
+@pytest.mark.parametrize("way", ["progressive", "gathered", "cached"])
 def test_photons_agree_with_path_tracing(way, name):
     integrator, parameters = WAYS[way]
     if way == "progressive":
@@ -174,9 +178,12 @@ def test_photons_agree_with_path_tracing(way, name):
     truth, found = blocks_of(scene, "bdpt", 16), blocks_of(scene, integrator, 16, **parameters)
     error = np.sqrt((truth.var(0, ddof=1) + found.var(0, ddof=1)) / SEEDS) + 1e-6
     off = np.abs(truth.mean(0) - found.mean(0))
-    assert (off < 9 * error + BLUR * truth.mean(0)).all()
+    brightest = truth.mean(0).max(
+        -1, keepdims=True
+    )  # of the channels: some have next to nothing, and less than it beyond the gamut
+    assert (off < 9 * error + BLUR * brightest).all()
     whole = np.sqrt((truth.mean(1).var(0, ddof=1) + found.mean(1).var(0, ddof=1)) / SEEDS)
-    assert (np.abs(truth.mean((0, 1)) - found.mean((0, 1))) < 5 * whole + 0.5 * BLUR * truth.mean((0, 1))).all()
+    assert (np.abs(truth.mean((0, 1)) - found.mean((0, 1))) < 5 * whole + 0.5 * BLUR * truth.mean((0, 1)).max()).all()
 
 
 @pytest.mark.parametrize("name", ["mirror and diffuse", "clear glass", "gloss", "rough glass"])
@@ -202,7 +209,7 @@ def wished(seed=1, **parameters):
     scene = bulb_in_a_ball()
     scene.camera = sd.Camera("camera", "ORTHO", looking((0, 0, 0), (0.5, 0.3, 0.7)), (-0.4, 0.4, -0.4, 0.4), 0.0, 1e6)
     scene.film = sd.Film(16, 16, filter="BOX", filter_width=1.0)
-    few = {"global_photons": 1000, "caustic_photons": 10, "gather": False}
+    few = {"global_photons": 1000, "caustic_photons": 10, "global_light": "PHOTONS"}
     settings = sd.Settings("photon_map", 1, seed=seed, threads=2, parameters={**BOUNCES, **few, **parameters})
     with Session(scene, settings) as session:
         while not session.wait():

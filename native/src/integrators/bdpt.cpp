@@ -124,7 +124,7 @@ class BdptIntegrator final : public Integrator {
   void send_photons(const RenderContext& context, int pass, const Film& film) {
     const int paths = photons_of(film);
     constexpr float kWorthLooking = 0.02f;
-    if (pass == 0) seen_ = find_seen(context, film, s_.limits, false);
+    if (pass == 0) seen_ = seen_points(find_ends(context, film, s_.limits, false, kLooksAcross), context.pool);
     const int rounds = pass == 0 ? EmissionLearner::kFirstRounds : std::has_single_bit(unsigned(pass)) ? 1 : 0;
     for (int round = 0; round < rounds && !context.cancelled; ++round)
       photon_aim_.learn(context, s_, paths / 2, [&](const LightVertices& path, Sampler&) {

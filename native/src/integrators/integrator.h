@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/kept.h"
 #include "film/film.h"
 #include "transport/render_context.h"
 
@@ -41,14 +42,6 @@ class Parameters {
  private:
   std::map<std::string, double> values_;
 };
-
-// What an integrator keeps from one render for the next: tables by name, as rows of numbers.
-struct KeptTable {
-  size_t columns = 0;
-  std::vector<float> numbers;
-  size_t rows() const { return columns ? numbers.size() / columns : 0; }
-};
-using Kept = std::map<std::string, KeptTable>;
 
 // CausticFlags of the scene's switches, which integrators that have them call so.
 inline uint8_t no_caustics(const Parameters& p) {

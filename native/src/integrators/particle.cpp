@@ -368,11 +368,13 @@ Rgb ParticleIntegrator::read(const ShadingPoint& point, const Bsdf& bsdf) const 
 void ParticleIntegrator::look(const RenderContext& context, const Film& film, const CameraRay& camera, Sampler& sampler,
                               PixelSample& result, std::vector<Vec3>* seen) const {
   DiffuseEndSettings end;
-  end.limits = s_.limits, end.without = s_.without, end.gathers = s_.gather;
+  end.limits = s_.limits, end.without = s_.without;
   end.direct_known = end.direct_gathered = direct_in_texels(context);
+  EndingPath ending{CameraPath(camera)};
   trace_to_diffuse(
-      context, film, end, camera, sampler, result, [](const ShadingPoint&, const Bsdf&) { return Rgb(); },
-      [&](const ShadingPoint& point, const Bsdf& bsdf, bool) {
+      context, film, end, camera, ending, sampler, result, [](const ShadingPoint&, const Bsdf&) { return Rgb(); },
+      [&](const ShadingPoint& point, const Bsdf& bsdf, bool gathered) -> std::optional<KnownLight> {
+        if (s_.gather && !gathered) return {};
         if (seen) seen->push_back(point.position);
         return KnownLight{Rgb(), read(point, bsdf)};
       });

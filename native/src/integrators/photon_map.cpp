@@ -1,13 +1,12 @@
 // Photon mapping in two passes [Jensen 1996; Jensen 2001, ch. 9]: photons are sent out once and stored; eye paths then find direct light by
 // sampling, follow what is specular, read caustics from their own map at diffuse surfaces, and gather all other light from the surfaces
-// that they see there, where it is known from the photons.
+// that they see there, where it is known from the photons; or find it in an irradiance cache, whose records have gathered so.
 #include "transport/photon_map.h"
-
-#include <bit>
 
 #include "core/check.h"
 #include "integrators/integrator.h"
 #include "transport/diffuse_end.h"
+#include "transport/irradiance_records.h"
 
 namespace gi {
 namespace {
@@ -19,32 +18,30 @@ PathState gathering() {
   return eye;
 }
 
-// Irradiance at every few photons, as gathering rays see it, looked up by the nearest. [Christensen 1999, "Faster photon map global
-// illumination"]
+// Irradiance where gathering rays end, looked up by the nearest. [Christensen 1999, "Faster photon map global illumination"] has it at
+// photons, but these lie where it is bright: what is dark would be read as what is bright beside it.
 class IrradianceMap {
  public:
   IrradianceMap() = default;
-  IrradianceMap(const PhotonMap& map, size_t count, float radius, const RenderContext& context) : radius_(radius) {
+  IrradianceMap(const std::vector<PathEnd>& places, const PhotonMap& map, size_t count, float radius, const RenderContext& context)
+      : count_(count), radius_(radius) {
     std::vector<Vec3> positions;
-    for (size_t k = 0; k < map.size(); ++k) {
-      if (!is_chosen(map.position(k))) continue;
-      records_.push_back({map.normal(k), Rgb()});
-      positions.push_back(map.position(k));
-    }
-    constexpr size_t kBatch = 256;
-    const PathState eye = gathering();
-    context.pool.for_each(int((records_.size() + kBatch - 1) / kBatch), context.cancelled, [&](int b) {
-      for (size_t k = size_t(b) * kBatch; k < std::min((size_t(b) + 1) * kBatch, records_.size()); ++k)
-        records_[k].irradiance = map.irradiance(positions[k], records_[k].normal, radius_, count, eye);
-    });
+    for (const PathEnd& p : places) positions.push_back(p.position);
     tree_ = PointTree(positions, context.pool);
-    std::vector<Record> in_order;
-    for (const uint32_t i : tree_.order()) in_order.push_back(records_[i]);
-    records_ = std::move(in_order);
+    records_.resize(tree_.size());
+    constexpr size_t kBatch = 256;
+    context.pool.for_each(int((records_.size() + kBatch - 1) / kBatch), context.cancelled, [&](int b) {
+      for (size_t k = size_t(b) * kBatch; k < std::min((size_t(b) + 1) * kBatch, records_.size()); ++k) {
+        Record& r = records_[k];
+        r.normal = places[tree_.order()[k]].normal;
+        r.irradiance = map.irradiance(tree_.point(uint32_t(k)), r.normal, radius_, count, kEye, &context.scene, &r.reach);
+      }
+    });
   }
 
-  // Power per square metre on the side of `normal`.
-  Rgb at(Vec3 position, Vec3 normal) const {
+  // Power per square metre on the side of `normal`; nothing if photons are from farther about than `distance`, which is how far it is
+  // seen from: from there it would show as a blot. [Jensen 2001, §9.3.4]
+  std::optional<Rgb> at(const PhotonMap& map, const Scene& scene, Vec3 position, Vec3 normal, float distance) const {
     constexpr float kSlope = 0.9f, kThickness = 0.5f;
     float best = sqr(radius_);
     uint32_t nearest = kNoId;
@@ -52,32 +49,34 @@ class IrradianceMap {
       if (dot(records_[k].normal, normal) < kSlope || sqr(dot(tree_.point(k) - position, normal)) > sqr(kThickness) * d2) return;
       if (d2 < best || k < nearest) best = d2, nearest = k;
     });
-    return nearest == kNoId ? Rgb() : records_[nearest].irradiance;
+    float reach = 0.0f;
+    Rgb found;
+    if (nearest != kNoId && best <= sqr(records_[nearest].reach))
+      found = records_[nearest].irradiance, reach = records_[nearest].reach;
+    else
+      found = map.irradiance(position, normal, radius_, count_, kEye, &scene, &reach);
+    return reach > distance ? std::nullopt : std::optional(found);
   }
   size_t memory_bytes() const { return records_.size() * sizeof(Record) + tree_.memory_bytes(); }
 
  private:
+  static inline const PathState kEye = gathering();
   struct Record {
     Vec3 normal;
     Rgb irradiance;
+    float reach = 0;  // its photons are in this radius
   };
-
-  // One of four, whatever order they come in: kept photons are to show the same picture.
-  static bool is_chosen(Vec3 p) {
-    const uint32_t y = hash_combine(std::bit_cast<uint32_t>(p.y), std::bit_cast<uint32_t>(p.z));
-    return hash_combine(std::bit_cast<uint32_t>(p.x), y) % 4 == 0;
-  }
-
-  std::vector<Record> records_;
+  std::vector<Record> records_;  // in the order of the tree
   PointTree tree_;
+  size_t count_ = 0;
   float radius_ = 0;
 };
 
-// A radius that `count` photons lie well within, where they are of the usual density.
-float typical_spread(const PhotonMap& map, size_t count) {
-  const size_t probes = std::min<size_t>(256, map.size());
+// A radius that `count` photons lie well within, at most of the places.
+float typical_spread(const PhotonMap& map, const std::vector<PathEnd>& places, size_t count) {
+  const size_t probes = std::min<size_t>(256, places.size());
   std::vector<float> found;
-  for (size_t i = 0; i < probes; ++i) found.push_back(map.spread(map.position(i * map.size() / probes), count));
+  for (size_t i = 0; i < probes; ++i) found.push_back(map.spread(places[i * places.size() / probes].position, count));
   if (found.empty()) return 0.0f;
   const auto most = found.begin() + ptrdiff_t(found.size() * 3 / 4);
   std::nth_element(found.begin(), most, found.end());
@@ -101,6 +100,9 @@ struct KeptPhotons {
 };
 KeptPhotons photons_of(const Kept& kept, const std::string& name);
 
+// How light between diffuse surfaces is found.
+enum class GlobalLight { kGathered, kCached, kPhotons, kNone };
+
 class PhotonMapIntegrator final : public Integrator {
  public:
   explicit PhotonMapIntegrator(const Parameters& p)
@@ -110,59 +112,126 @@ class PhotonMapIntegrator final : public Integrator {
         caustic_count_(size_t(p.integer("caustic_count"))),
         radius_(p.real("radius")),
         goal_(0.01 * p.number("photon_error")),
-        most_bytes_(size_t(p.integer("photon_memory")) << 20) {
-    s_.limits = {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
-                 p.integer("transparent_bounces")};
-    s_.without = no_caustics(p);
-    s_.gathers = s_.direct_gathered = s_.caustics_known = p.on("gather");
-  }
+        most_bytes_(size_t(p.integer("photon_memory")) << 20),
+        way_(GlobalLight(p.integer("global_light"))),
+        s_(settings(p, gathers())),
+        records_({p.real("record_error"), p.integer("record_samples"), 1, kRefinement, kSpacing, s_.limits}) {}
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     if (!built_) build(context, film);
     if (context.cancelled) return;
-    const bool shows_photons = film.wants("Photons") || film.wants("Photon Density") || film.wants("Photon Radius");
+    if (way_ == GlobalLight::kCached) {
+      records_.before_pass(context, film, pass, [&](const CameraRay& from, const PathState& state, Sampler& sampler) -> GatheredRay {
+        EndingPath ending{CameraPath(from), true};
+        ending.path.state = state;
+        ending.path.state.without = s_.without;
+        ending.path.seen_from_camera = false;
+        PixelSample found;
+        trace(context, film, from, ending, sampler, found);
+        return {found.radiance, ending.first_distance};
+      });
+      if (context.cancelled) return;
+    }
     for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) {
-      trace_to_diffuse(
-          context, film, s_, camera, sampler, result,
-          [&](const ShadingPoint& point, const Bsdf& bsdf) {
-            if (shows_photons && point.path.depth == 0) show_photons(point, result);
-            return caustics(point, bsdf);
-          },
-          [&](const ShadingPoint& point, const Bsdf& bsdf, bool gathered) {
-            if (shows_photons && point.path.depth == 0) show_photons(point, result);
-            const Rgb global = light_of(point, bsdf, [&](Vec3 normal) {
-              return s_.gathers ? irradiance_.at(point.position, normal)
-                                : global_.map.irradiance(point.position, normal, global_.reach, global_.count, point.path);
-            });
-            return KnownLight{gathered ? Rgb() : caustics(point, bsdf), global};
-          });
+      EndingPath ending{CameraPath(camera)};
+      trace(context, film, camera, ending, sampler, result);
     });
   }
+  void finish_pass(const RenderContext& context, int pass) override {
+    if (way_ == GlobalLight::kCached) records_.after_pass(context, pass);
+  }
 
-  void take_over(const Kept& kept) override { kept_global_ = photons_of(kept, "global"), kept_caustic_ = photons_of(kept, "caustic"); }
-  Kept keep() const override { return built_ ? Kept{{"global", global_.keep()}, {"caustic", caustic_.keep()}} : Kept(); }
+  void take_over(const Kept& kept) override {
+    Kept records = kept;
+    kept_caustic_ = photons_of(kept, kCaustic);
+    if (way_ != GlobalLight::kNone) kept_global_ = photons_of(kept, kGlobal);
+    records.erase(kGlobal), records.erase(kCaustic);
+    records_.take_over(records);
+  }
+  Kept keep() const override {
+    if (!built_) return {};
+    Kept kept = records_.keep();
+    kept[kCaustic] = caustic_.keep();
+    if (way_ != GlobalLight::kNone) kept[kGlobal] = global_.keep();
+    return kept;
+  }
 
  private:
+  static constexpr const char *kGlobal = "global", *kCaustic = "caustic";
+  static constexpr float kRefinement = 0.25f;  // of the cache, which is the same as that of irradiance caching
+  static constexpr IrradianceSpacing kSpacing{1.5f, 40.0f, 0.0f, 0.0f};
+
+  static constexpr int kBatches = 8;  // of photons
+  static constexpr double kTimeShare = 0.15;  // of a time limit, for each map
+  static constexpr int kRecordsAcross = 192;  // paths across the picture whose ends know irradiance
+
+  static DiffuseEndSettings settings(const Parameters& p, bool gathers) {
+    DiffuseEndSettings s;
+    s.limits = {p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
+                p.integer("transparent_bounces")};
+    s.without = no_caustics(p);
+    s.direct_gathered = s.caustics_known = gathers;
+    return s;
+  }
+  bool gathers() const { return way_ == GlobalLight::kGathered || way_ == GlobalLight::kCached; }
+
+  void trace(const RenderContext& context, const Film& film, const CameraRay& camera, EndingPath& ending, Sampler& sampler,
+             PixelSample& result) const {
+    const bool shows_photons = film.wants("Photons") || film.wants("Photon Density") || film.wants("Photon Radius");
+    trace_to_diffuse(
+        context, film, s_, camera, ending, sampler, result,
+        [&](const ShadingPoint& point, const Bsdf& bsdf) { return caustics(point, bsdf); },
+        [&](const ShadingPoint& point, const Bsdf& bsdf, bool gathered) -> std::optional<KnownLight> {
+          if (shows_photons && point.path.depth == 0) show_photons(point, result);
+          const auto global = global_light(context.scene, point, bsdf, ending, result);
+          if (!global) return {};
+          return KnownLight{gathered ? Rgb() : caustics(point, bsdf), *global};
+        });
+  }
+
+  // Of the diffuse lobes; nothing where it has to be gathered.
+  std::optional<Rgb> global_light(const Scene& scene, const ShadingPoint& point, const Bsdf& bsdf, const EndingPath& ending,
+                                  PixelSample& result) const {
+    if (ending.gathered)
+      return light_of(point, bsdf,
+                      [&](Vec3 normal) { return irradiance_.at(global_.map, scene, point.position, normal, ending.last_distance); });
+    switch (way_) {
+      case GlobalLight::kGathered: return {};
+      case GlobalLight::kCached: return records_.read(point, bsdf, result);
+      case GlobalLight::kPhotons:
+        return light_of(point, bsdf, [&](Vec3 normal) {
+          return std::optional(global_.map.irradiance(point.position, normal, global_.reach, global_.count, point.path, &scene));
+        });
+      case GlobalLight::kNone: break;
+    }
+    return Rgb();
+  }
+
   void build(const RenderContext& context, const Film& film) {
     const double start = context.seconds();
-    if (kept_global_.paths == 0.0) {
+    const auto seen_global = find_ends(context, film, s_.limits, gathers(), kLooksAcross),
+               seen_caustic = find_ends(context, film, s_.limits, false, kLooksAcross);
+    if (kept_caustic_.paths == 0.0) {
       const FilmSpec& spec = film.spec();
       SubpathSettings light;
       light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height};
-      const uint8_t all = s_.gathers ? kDirectPhoton | kCausticPhoton | kGlobalPhoton : uint8_t(kGlobalPhoton);
-      global_ = send(context, light, "global", global_photons_, global_count_, all, find_seen(context, film, s_.limits, s_.gathers));
+      const uint8_t all = gathers() ? kAllPhotons : kGlobalPhoton;
+      if (way_ != GlobalLight::kNone) global_ = send(context, light, kGlobal, global_photons_, global_count_, all, seen_global);
       light.only_by_mirrors = true;
-      caustic_ =
-          send(context, light, "caustic", caustic_photons_, caustic_count_, kCausticPhoton, find_seen(context, film, s_.limits, false));
+      caustic_ = send(context, light, kCaustic, caustic_photons_, caustic_count_, kCausticPhoton, seen_caustic);
     } else {
-      global_ = {PhotonMap(std::move(kept_global_.photons), kept_global_.paths, context.pool), kept_global_.paths};
+      if (way_ != GlobalLight::kNone)
+        global_ = {PhotonMap(std::move(kept_global_.photons), kept_global_.paths, context.pool), kept_global_.paths};
       caustic_ = {PhotonMap(std::move(kept_caustic_.photons), kept_caustic_.paths, context.pool), kept_caustic_.paths};
-      come_to_neighbours(global_, global_count_), come_to_neighbours(caustic_, caustic_count_);
+      come_to_neighbours(global_, seen_global, global_count_), come_to_neighbours(caustic_, seen_caustic, caustic_count_);
     }
     if (context.cancelled) return;
     const double traced = context.seconds();
-    context.log.stage("irradiance at photons");
-    if (s_.gathers) irradiance_ = IrradianceMap(global_.map, global_.count, global_.reach, context);
+    context.log.stage("irradiance by photons");
+    if (gathers()) {
+      const auto places = find_ends(context, film, s_.limits, true, kRecordsAcross);
+      irradiance_ = IrradianceMap(places, global_.map, global_.count, global_.reach, context);
+    }
     context.log.stage("");
     built_ = !context.cancelled;
     const size_t bytes = global_.map.memory_bytes() + caustic_.map.memory_bytes();
@@ -176,15 +245,23 @@ class PhotonMapIntegrator final : public Integrator {
 
   // Sends light paths that aim at what is seen: `paths` of them, and as many again until the error is as wished.
   Stock send(const RenderContext& context, SubpathSettings light, const std::string& name, int paths, size_t count, uint8_t classes,
-             const SeenPoints& seen) const {
+             const std::vector<PathEnd>& seen) const {
     context.log.stage(name + " photons");
     const EmissionGuide guide = learn_emission(context, light, paths, classes, seen);
     light.guide = &guide;
-    std::vector<Photon> photons = trace_photons(context, light, 0, paths, classes);
     const double began = context.seconds();
-    for (double sent = paths; !context.cancelled; sent *= 2.0) {
+    std::vector<Photon> photons;
+    const int batch = (paths + kBatches - 1) / kBatches;
+    int batches = 0;
+    do {
+      const auto more = trace_photons(context, light, batches, batch, classes);
+      photons.insert(photons.end(), more.begin(), more.end());
+    } while (++batches * batch < paths && !context.cancelled && !is_late(context, began));
+    if (batches * batch < paths && !context.cancelled)
+      context.log.say(name + " photons: time for " + std::to_string(batches * batch) + " of " + std::to_string(paths) + " light paths");
+    for (double sent = double(batches) * batch; !context.cancelled; sent *= 2.0) {
       Stock stock{PhotonMap(photons, sent, context.pool), sent};
-      const PhotonError error = come_to_neighbours(stock, count);
+      const PhotonError error = come_to_neighbours(stock, seen, count);
       if (goal_ <= 0.0) return stock;
       const char* reason = photons.empty()                                                                             ? "there are none"
                            : error.total() <= goal_                                                                    ? "as wished"
@@ -207,15 +284,20 @@ class PhotonMapIntegrator final : public Integrator {
   }
 
   // Sets how many neighbours are looked for, and how far away: `count`, or as many as the noise that is wished asks for.
-  PhotonError come_to_neighbours(Stock& stock, size_t count) const {
+  PhotonError come_to_neighbours(Stock& stock, const std::vector<PathEnd>& seen, size_t count) const {
     constexpr size_t kFewest = 10, kMost = 5000;
-    stock.count = count, stock.reach = typical_spread(stock.map, count);
+    stock.count = count, stock.reach = typical_spread(stock.map, seen, count);
     if (goal_ <= 0.0) return {};
-    const PathState eye = s_.gathers ? gathering() : PathState();
-    const double noise = stock.map.error(stock.reach, count, eye).noise, wished = goal_ * std::sqrt(0.5);
+    const PathState eye = gathers() ? gathering() : PathState();
+    const double noise = stock.map.error(seen, stock.reach, count, eye).noise, wished = goal_ * std::sqrt(0.5);
     stock.count = std::clamp(size_t(double(count) * sqr(noise / wished)), kFewest, kMost);
-    stock.reach = typical_spread(stock.map, stock.count);
-    return stock.map.error(stock.reach, stock.count, eye);
+    stock.reach = typical_spread(stock.map, seen, stock.count);
+    return stock.map.error(seen, stock.reach, stock.count, eye);
+  }
+
+  // Whether photons sent since `began` have had their part of the time limit.
+  static bool is_late(const RenderContext& context, double began) {
+    return context.time_limit > 0.0 && context.seconds() - began > kTimeShare * context.time_limit;
   }
 
   static std::string percent(double x) {
@@ -236,13 +318,16 @@ class PhotonMapIntegrator final : public Integrator {
     return caustic_.map.radiance(point, bsdf, radius_ * point.footprint, caustic_.count);
   }
 
-  // What the diffuse lobes make of irradiance(normal of the side), as if it came from everywhere alike.
+  // What the diffuse lobes make of irradiance(normal of the side), as if it came from everywhere alike; nothing where that is not known.
   template <class Irradiance>
-  static Rgb light_of(const ShadingPoint& point, const Bsdf& bsdf, const Irradiance& irradiance) {
+  static std::optional<Rgb> light_of(const ShadingPoint& point, const Bsdf& bsdf, const Irradiance& irradiance) {
     Rgb radiance;
     for (const uint8_t side : {kReflection, kTransmission}) {
       const Rgb albedo = bsdf.diffuse_albedo(point.wo, side);
-      if (!is_black(albedo)) radiance += albedo * irradiance(side == kReflection ? point.ng : -point.ng) * kInvPi;
+      if (is_black(albedo)) continue;
+      const std::optional<Rgb> found = irradiance(side == kReflection ? point.ng : -point.ng);
+      if (!found) return {};
+      radiance += albedo * *found * kInvPi;
     }
     return radiance;
   }
@@ -252,7 +337,9 @@ class PhotonMapIntegrator final : public Integrator {
   float radius_;
   double goal_;  // relative error; 0: none
   size_t most_bytes_;
+  GlobalLight way_;
   DiffuseEndSettings s_;
+  IrradianceRecords records_;
   Stock global_, caustic_;
   IrradianceMap irradiance_;
   KeptPhotons kept_global_, kept_caustic_;
@@ -304,8 +391,21 @@ const Descriptor& photon_map_descriptor() {
            "Photons are sent and neighbours chosen until the estimated error is below; 0: the numbers above", "%"},
           {"photon_memory", "Photon Memory", Kind::kInt, 512, 1, 1 << 20,
            "Of each map, at most, where photons are sent until the error is met", "MiB"},
-          {"gather", "Final Gather", Kind::kBool, 1, 0, 1,
-           "Looks for indirect light in all directions, and reads photons where it comes from; off: reads them where the eye looks"},
+          {"global_light",
+           "Global Light",
+           Kind::kChoice,
+           0,
+           0,
+           3,
+           "How light that diffuse surfaces throw on each other is found",
+           "",
+           {{"GATHERED", "Final Gather", "Looks in all directions from every surface seen, and reads photons where light comes from"},
+            {"CACHED", "Irradiance Cache", "Gathers at few places and interpolates between them: smooth soon"},
+            {"PHOTONS", "Photons", "Reads photons where the eye looks: at once, and blotchy"},
+            {"NONE", "Off", "Leaves it out"}}},
+          {"record_error", "Cache Error", Kind::kFloat, 0.15, 0.01, 1, "Allowed between records of the irradiance cache"},
+          {"record_samples", "Cache Samples", Kind::kInt, 256, 16, 1 << 20,
+           "Rays over the hemisphere of each record, to begin with and each time that it is refined"},
           {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
           {"diffuse_bounces", "Diffuse", Kind::kInt, 4, 0, 1024, "Diffuse reflections"},
           {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},

@@ -21,7 +21,8 @@ class SppmIntegrator final : public Integrator {
     SubpathSettings light;
     light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height};
     if (guide_is_old_) {
-      guide_ = learn_emission(context, light, photons_, kCausticPhoton | kGlobalPhoton, find_seen(context, film, s_.limits, false));
+      guide_ = learn_emission(context, light, photons_, kCausticPhoton | kGlobalPhoton,
+                              find_ends(context, film, s_.limits, false, kLooksAcross));
       guide_is_old_ = context.cancelled;
     }
     light.guide = &guide_;
@@ -31,10 +32,11 @@ class SppmIntegrator final : public Integrator {
     context.log.set("photons", double(map.size()));
     context.log.set("radius, pixels", double(scale));
     for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) {
+      EndingPath ending{CameraPath(camera)};
       trace_to_diffuse(
-          context, film, s_, camera, sampler, result, [](const ShadingPoint&, const Bsdf&) { return Rgb(); },
+          context, film, s_, camera, ending, sampler, result, [](const ShadingPoint&, const Bsdf&) { return Rgb(); },
           [&](const ShadingPoint& point, const Bsdf& bsdf, bool) {
-            return KnownLight{Rgb(), map.radiance(point, bsdf, scale * point.footprint)};
+            return std::optional(KnownLight{Rgb(), map.radiance(point, bsdf, scale * point.footprint)});
           });
     });
   }

@@ -13,10 +13,16 @@ struct KnownLight {
 struct DiffuseEndSettings {
   BounceLimits limits;
   uint8_t without = 0;          // CausticFlags: what a path does not see after a diffuse bounce
-  bool gathers = false;         // the first diffuse surface is not the end: from there a path looks for the light of others
   bool direct_known = false;    // what is known where a path ends includes direct light: of one that has not gathered,
   bool direct_gathered = false;  // of one that has
   bool caustics_known = false;  // where a path gathers, the light that mirrors, glass and glossy surfaces throw is known
+};
+
+// A path under way. One that has gathered has left a diffuse surface to look for the light of others.
+struct EndingPath {
+  CameraPath path;
+  bool gathered = false;
+  float first_distance = kInf, last_distance = kInf;  // of rays
 };
 
 // Direct light by chance: luminaires that a ray of the chosen lobes meets before anything else.
@@ -42,18 +48,19 @@ inline Rgb meet_light(const RenderContext& context, const BounceLimits& limits, 
   return found;
 }
 
-// Follows one path. What is known of the radiance of the diffuse lobes: `at_gather(point, bsdf)` of caustics, `at_end(point, bsdf,
-// gathered)`.
+// Follows one path. `at_end(point, bsdf, gathered)`: what is known of the radiance of the diffuse lobes, as std::optional<KnownLight>.
+// Nothing: it shall gather from here, though it may have before, and `at_gather(point, bsdf)` is what is known of caustics here.
 template <class AtGather, class AtEnd>
 void trace_to_diffuse(const RenderContext& context, const Film& film, const DiffuseEndSettings& s, const CameraRay& camera,
-                      Sampler& sampler, PixelSample& result, const AtGather& at_gather, const AtEnd& at_end) {
+                      EndingPath& ending, Sampler& sampler, PixelSample& result, const AtGather& at_gather, const AtEnd& at_end) {
   constexpr LightSampling kMode = LightSampling::kMis;
   constexpr uint8_t kOthers = kGlossy | kSpecular | kTransparent;
   constexpr int kIndirectDepth = 1 << 20;
   Bsdf bsdf;
-  CameraPath path(camera);
+  CameraPath& path = ending.path;
+  bool& gathered = ending.gathered;
   bool may_scatter = true;
-  bool gathered = false, known = false;  // `known`: what shines here has been counted where the path gathered
+  bool known = gathered && s.caustics_known;  // what shines here has been counted where the path gathered
   const int first_depth = context.lightmap ? context.lightmap->first_depth() : 0;
   LightTerm beyond = kDirectTerm;  // what comes from behind the first bounce belongs to
   const auto add_to = [&](LightTerm term, Rgb radiance, int depth) {
@@ -78,6 +85,8 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
       if (!known) add_met(path.leave(context, film, kMode, result));
       break;
     }
+    if (bounce == 0) ending.first_distance = hit->t;
+    ending.last_distance = hit->t;
     const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
     const Rgb emitted = known ? Rgb() : surface_emission(context, point, bsdf.emission, path.origin, kMode);
     if (depth == 0) result.emission += path.throughput * emitted;
@@ -91,30 +100,31 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
                                  [p](Vec3, const LobeEval& e) { return p * e.pdf_dir; });
     };
     float p_lobes = 1.0f;  // of the choice between diffuse lobes and others
-    const bool is_diffuse = bsdf.flags() & kDiffuse, gathers = s.gathers && !gathered && is_diffuse;
+    const bool ends = may_scatter && (bsdf.flags() & kDiffuse);
+    const std::optional<KnownLight> found = ends ? at_end(point, bsdf, gathered) : std::nullopt;
+    const bool gathers = ends && !found;
     if (gathers) {
       // From here either the diffuse lobes are followed, which then gather, or the others.
-      if (may_scatter) add(at_gather(point, bsdf), kIndirectDepth, kCausticTerm);
+      add(at_gather(point, bsdf), kIndirectDepth, kCausticTerm);
       const float diffuse = average(bsdf.albedo(point.wo, kDiffuse));
       const float others = average(bsdf.albedo(point.wo, kGlossy | kSpecular) + bsdf.transparency);
       const float p_diffuse = others > 0.0f ? std::clamp(diffuse / (diffuse + others), 0.1f, 0.9f) : 1.0f;
       if (p_diffuse == 1.0f) {
-        if (may_scatter) add(direct_light(), depth + 1, kDirectTerm);
+        add(direct_light(), depth + 1, kDirectTerm);
       } else {
         const bool follows_diffuse = sampler.next_1d() < p_diffuse;
         for (const bool last : {false, true}) {
           const bool is_for_diffuse = follows_diffuse == last;
           p_lobes = is_for_diffuse ? p_diffuse : 1.0f - p_diffuse;
           bsdf.choose(is_for_diffuse ? uint8_t(kDiffuse) : kOthers, point.wo);
-          if (may_scatter) add(direct_light(p_lobes), depth + 1, is_for_diffuse ? kDirectTerm : kSpecularTerm);
+          add(direct_light(p_lobes), depth + 1, is_for_diffuse ? kDirectTerm : kSpecularTerm);
         }
       }
     } else if (may_scatter) {
       // The diffuse lobes end the path, the others go on.
-      if (is_diffuse) {
-        const KnownLight found = at_end(point, bsdf, gathered);
-        add(found.caustic, kIndirectDepth, kCausticTerm);
-        add(found.global, kIndirectDepth, kGlobalTerm);
+      if (found) {
+        add(found->caustic, kIndirectDepth, kCausticTerm);
+        add(found->global, kIndirectDepth, kGlobalTerm);
         bsdf.choose(kDiffuse, point.wo);
         if (!(gathered ? s.direct_gathered : s.direct_known)) {
           add(direct_light(), depth + 1, kDirectTerm);
@@ -145,7 +155,7 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
     const FilmSpec& spec = film.spec();
     if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
       path.seen_from_camera = false;
-    known = gathered && s.caustics_known;
+    known = gathered && !gathers_next && s.caustics_known;
     if (gathers_next) gathered = true;
     path.state.without = next->flags & kDiffuse ? s.without : 0;
     path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : p_lobes * next->pdf_dir};

@@ -60,6 +60,7 @@ class EmissionLearner {
  public:
   explicit EmissionLearner(float even = EmissionGuide::kEven) : even_(even) {}
   const EmissionGuide& guide() const { return guide_; }
+  size_t size() const { return trials_.size(); }  // paths that brought something
 
   // One more round, of about `count` paths; worth(vertices, sampler) says what each brings.
   template <class Worth>

@@ -33,34 +33,14 @@ Rgb power_of(const LightVertex& v, const SubpathSettings& settings, uint8_t clas
   return v.power * share * (v.hides_mirrors(settings.without) ? Rgb(1.0f) - v.last_by_mirrors : Rgb(1.0f));
 }
 
-float cross2(Vec2 a, Vec2 b) { return a.x * b.y - a.y * b.x; }
-
-// Area of the convex hull; reorders the points. [Andrew 1979]
-float hull_area(std::vector<Vec2>& points) {
-  std::sort(points.begin(), points.end(), [](Vec2 a, Vec2 b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
-  static thread_local std::vector<Vec2> kept;
-  kept.resize(points.size());
-  Vec2* const chain = kept.data();
-  float twice = 0;
-  for (const float side : {1.0f, -1.0f}) {
-    size_t n = 0;
-    for (const Vec2 p : points) {
-      while (n > 1 && side * cross2(chain[n - 1] - chain[n - 2], p - chain[n - 1]) <= 0.0f) --n;
-      chain[n++] = p;
-    }
-    for (size_t i = 1; i < n; ++i) twice += side * cross2(chain[i - 1], chain[i]);
-  }
-  return 0.5f * twice;
-}
-
-// The share of a disc that is surface, by the points found in it: at edges and corners there is less. [Jensen 2001, §7.2.3]
-float covered_share(std::vector<Vec2>& points, float radius_squared) {
-  constexpr size_t kLeast = 16;
-  constexpr float kWhole = 0.85f;  // scatter of the hull
-  if (points.size() < kLeast) return 1.0f;
-  const float missed = 3.383f * std::pow(float(points.size()), -2.0f / 3.0f);  // by the hull of points in a disc [Renyi & Sulanke 1963]
-  const float share = hull_area(points) / ((1.0f - missed) * kPi * radius_squared);
-  return share > kWhole ? 1.0f : std::max(share, 0.1f);
+// Whether points in a disc lie as they would if all of it were surface, evenly lit: about the middle, and as far in any direction.
+bool is_even(const std::vector<Vec2>& points, float radius_squared) {
+  constexpr float kShift = 0.12f, kSpread = 0.19f;  // of the radius; of its square, where an even disc has 1/4
+  Vec2 mean{0, 0};
+  float xx = 0, xy = 0, yy = 0;
+  for (const Vec2 p : points) mean.x += p.x, mean.y += p.y, xx += p.x * p.x, xy += p.x * p.y, yy += p.y * p.y;
+  const float n = float(points.size()), least = 0.5f * (xx + yy - std::hypot(xx - yy, 2.0f * xy));
+  return sqr(mean.x) + sqr(mean.y) < sqr(kShift * n) * radius_squared && least > kSpread * n * radius_squared;
 }
 
 }  // namespace
@@ -101,48 +81,64 @@ double shrinking(int pass, double alpha) {
   return std::exp(std::lgamma(pass + 1 + alpha) - std::lgamma(1 + alpha) - std::lgamma(pass + 2.0));
 }
 
-SeenPoints find_seen(const RenderContext& context, const Film& film, const BounceLimits& limits, bool gathers) {
-  constexpr int kAcross = 48;
+std::vector<PathEnd> find_ends(const RenderContext& context, const Film& film, const BounceLimits& limits, bool gathers, int across) {
   constexpr uint32_t kStream = 0x7365656eu;
   DiffuseEndSettings end;
-  end.limits = limits, end.gathers = gathers, end.direct_known = end.direct_gathered = end.caustics_known = true;
+  end.limits = limits, end.direct_known = end.direct_gathered = end.caustics_known = true;
   const FilmSpec& spec = film.spec();
   const Vec2 pixel{1.0f / float(spec.width), 1.0f / float(spec.height)};
   const size_t eyes = 1 + context.path.size();
-  std::vector<std::vector<Vec3>> rows(kAcross);
-  context.pool.for_each(kAcross, context.cancelled, [&](int y) {
-    for (int x = 0; x < kAcross; ++x) {
+  std::vector<std::vector<PathEnd>> rows{size_t(across)};
+  context.pool.for_each(across, context.cancelled, [&](int y) {
+    for (int x = 0; x < across; ++x) {
       Sampler sampler(hash_combine(context.seed, kStream), uint32_t(y), uint32_t(x));
       const Vec2 place = sampler.next_2d(), lens = sampler.next_2d();
-      const size_t eye = size_t(y * kAcross + x) % eyes;
+      const size_t eye = size_t(y * across + x) % eyes;
       const Camera& camera = eye == 0 ? context.camera : context.path[eye - 1];
-      const CameraRay ray = camera.sample({(float(spec.x0) + (float(x) + place.x) / kAcross * float(spec.region_width())) * pixel.x,
-                                           (float(spec.y0) + (float(y) + place.y) / kAcross * float(spec.region_height())) * pixel.y},
-                                          pixel, lens);
+      const float u = (float(x) + place.x) / float(across), v = (float(y) + place.y) / float(across);
+      const CameraRay ray = camera.sample(
+          {(float(spec.x0) + u * float(spec.region_width())) * pixel.x, (float(spec.y0) + v * float(spec.region_height())) * pixel.y},
+          pixel, lens);
       PixelSample nothing;
-      const auto note = [&](const ShadingPoint& point, const Bsdf&, bool) {
-        return rows[size_t(y)].push_back(point.position), KnownLight();
+      EndingPath ending{CameraPath(ray)};
+      const auto note = [&](const ShadingPoint& point, const Bsdf&, bool gathered) -> std::optional<KnownLight> {
+        if (gathers && !gathered) return {};
+        return rows[size_t(y)].push_back({point.position, point.ng}), KnownLight();
       };
-      trace_to_diffuse(context, film, end, ray, sampler, nothing, [](const ShadingPoint&, const Bsdf&) { return Rgb(); }, note);
+      trace_to_diffuse(context, film, end, ray, ending, sampler, nothing, [](const ShadingPoint&, const Bsdf&) { return Rgb(); }, note);
     }
   });
-  std::vector<Vec3> all;
-  for (const auto& row : rows) all.insert(all.end(), row.begin(), row.end());
-  return SeenPoints(all, context.pool);
+  return joined(std::move(rows));
+}
+
+SeenPoints seen_points(const std::vector<PathEnd>& ends, ThreadPool& pool) {
+  std::vector<Vec3> points;
+  for (const PathEnd& end : ends) points.push_back(end.position);
+  return SeenPoints(points, pool);
 }
 
 EmissionGuide learn_emission(const RenderContext& context, const SubpathSettings& settings, int photons, uint8_t classes,
-                             const SeenPoints& seen) {
+                             const std::vector<PathEnd>& ends) {
+  constexpr size_t kEnough = 30000;  // paths that brought something
+  constexpr double kTimeShare = 0.05;  // of a time limit
+  constexpr float kOnTheWay = 0.05f;  // what light of other classes is worth, which at least comes near what is seen
+  constexpr int kMostRounds = 16;
+  const SeenPoints seen = seen_points(ends, context.pool);
   EmissionLearner learner;
-  for (int round = 0; round < EmissionLearner::kFirstRounds && !context.cancelled; ++round)
+  const double began = context.seconds();
+  for (int round = 0; round < kMostRounds && !context.cancelled; ++round) {
+    if (round >= EmissionLearner::kFirstRounds && learner.size() > kEnough) break;
+    if (context.time_limit > 0.0 && context.seconds() - began > kTimeShare * context.time_limit) break;
     learner.learn(context, settings, photons / 8, [&](const LightVertices& path, Sampler&) {
       float worth = 0.0f;
       for (int i = 0; i < int(path.count()); ++i) {
-        const Rgb power = power_of(path[size_t(i)], settings, classes);
-        if (!is_black(power) && seen.near(path[size_t(i)].point.position)) worth += average(power);
+        const LightVertex& v = path[size_t(i)];
+        const float all = average(power_of(v, settings, kAllPhotons)), wished = average(power_of(v, settings, classes));
+        if (all > 0.0f) worth += (wished + kOnTheWay * (all - wished)) * seen.density(v.point.position);
       }
       return worth;
     });
+  }
   return learner.guide();
 }
 
@@ -182,17 +178,17 @@ std::vector<Photon> PhotonMap::photons() const {
   return all;
 }
 
-PhotonError PhotonMap::error(float radius, size_t count, const PathState& eye) const {
-  const size_t probes = std::min<size_t>(512, size());
+PhotonError PhotonMap::error(const std::vector<PathEnd>& places, float radius, size_t count, const PathState& eye) const {
+  const size_t probes = std::min<size_t>(512, places.size());
   double noise = 0, difference = 0;
   size_t lit = 0;
   for (size_t i = 0; i < probes; ++i) {
-    const size_t k = i * size() / probes;
-    const Rgb all = irradiance(position(k), normal(k), radius, count, eye),
-              half = irradiance(position(k), normal(k), radius, count / 2, eye);
+    const auto& [position, normal] = places[i * places.size() / probes];
+    const Rgb all = irradiance(position, normal, radius, count, eye, nullptr),
+              half = irradiance(position, normal, radius, count / 2, eye, nullptr);
     if (is_black(all)) continue;
     double sum = 0, squares = 0;
-    for (const auto& f : around(position(k), normal(k), radius, count, eye)) {
+    for (const auto& f : around(position, normal, radius, count, eye)) {
       const float* power = lights_[f.point].power;
       const double mean = power[0] + power[1] + power[2];
       sum += mean, squares += mean * mean;
@@ -273,25 +269,45 @@ const std::vector<PointTree::Found>& PhotonMap::around(Vec3 position, Vec3 norma
   return found;
 }
 
-Rgb PhotonMap::irradiance(Vec3 position, Vec3 normal, float radius, size_t count, const PathState& eye) const {
+Rgb PhotonMap::irradiance(Vec3 position, Vec3 normal, float radius, size_t count, const PathState& eye, const Scene* scene,
+                          float* farthest) const {
   const std::vector<PointTree::Found>& found = around(position, normal, radius, count, eye);
+  constexpr float kLeastShare = 0.4f;
+  constexpr int kMostHalvings = 3;
   if (found.empty()) return Rgb();
   float end = 0.0f;
   for (const auto& f : found) end = std::max(end, f.distance_squared);
   if (found.size() < count) end = sqr(radius);
-  static thread_local std::vector<Vec2> places;
-  places.clear();
-  const Frame frame = Frame::from_normal(normal);
+  if (farthest) *farthest = std::sqrt(end);
+  const float share_of_farthest = found.size() < count ? 1.0f : float(count - 1) / float(count);  // it only marks the border
+  const float per_area = share_of_farthest * scale_ / (kPi * end);
   Rgb sum;
-  for (const auto& f : found) {
+  const auto add = [&](const PointTree::Found& f) {
     const float* power = lights_[f.point].power;
     sum += Rgb(power[0], power[1], power[2]);
-    const Vec3 place = frame.to_local(tree_.point(f.point) - position);
-    places.push_back({place.x, place.y});
+  };
+  if (!scene) {
+    for (const auto& f : found) add(f);
+    return sum * per_area;
   }
-  // The farthest one only marks the border.
-  const float counted = found.size() < count ? 1.0f : float(count - 1) / float(count);
-  return sum * (counted * scale_ / (kPi * end * covered_share(places, end)));
+  static thread_local std::vector<Vec2> places;
+  float all = per_area;  // of what lies in the disc, if all of it were surface
+  for (int halvings = 0;; ++halvings) {
+    const SurfaceDisc disc(*scene, position, normal, std::sqrt(end));
+    places.clear();
+    sum = Rgb();
+    for (const auto& f : found) {
+      const Vec2 place = disc.place(tree_.point(f.point));
+      if (f.distance_squared > end || !(disc.is_open() || disc.sees(place))) continue;
+      places.push_back(place);
+      add(f);
+    }
+    if (disc.is_open() && is_even(places, end)) return sum * all;
+    const float share = disc.share();
+    if (share > kLeastShare || halvings == kMostHalvings) return sum * (all / share);
+    // Of so little a few rays do not tell how much it is.
+    end *= 0.25f, all = scale_ / (kPi * end);
+  }
 }
 
 }  // namespace gi

@@ -7,6 +7,7 @@
 #include "film/film.h"
 #include "transport/light_path.h"
 #include "transport/subpath.h"
+#include "transport/surface_disc.h"
 
 namespace gi {
 
@@ -43,6 +44,7 @@ enum PhotonClass : uint8_t {
   kDirectPhoton = 1,   // straight from a luminaire: L D
   kCausticPhoton = 2,  // by way of mirrors, glass and glossy surfaces alone: L S+ D
   kGlobalPhoton = 4,   // by way of a diffuse surface
+  kAllPhotons = 7,
 };
 
 // Sends out the `count` light paths of a pass, and keeps what they leave of the wished classes (bits of PhotonClass). All light is that of
@@ -53,21 +55,27 @@ std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSet
 // [Knaus & Zwicker 2011, eq. 15]
 double shrinking(int pass, double alpha);
 
-// Points on diffuse surfaces that eye paths end at, after gathering or without.
-SeenPoints find_seen(const RenderContext& context, const Film& film, const BounceLimits& limits, bool gathers);
+// Where an eye path ends on a diffuse surface, and the normal of the side that it came to.
+struct PathEnd {
+  Vec3 position, normal;
+};
+// Of `across` x `across` paths, after gathering or without.
+constexpr int kLooksAcross = 48;  // what shows where light is wanted
+std::vector<PathEnd> find_ends(const RenderContext& context, const Film& film, const BounceLimits& limits, bool gathers, int across);
+SeenPoints seen_points(const std::vector<PathEnd>& ends, ThreadPool& pool);
 
 // Learns to send photons of `classes` to what is seen.
 EmissionGuide learn_emission(const RenderContext& context, const SubpathSettings& settings, int photons, uint8_t classes,
-                             const SeenPoints& seen);
+                             const std::vector<PathEnd>& seen);
 
 // Whether what lies `away` is taken to be of the same surface: of like slope, and not off the plane. Its normal may have any length.
 inline bool of_one_surface(Vec3 away, Vec3 its_normal, Vec3 normal, float radius) {
-  constexpr float kSlope = 0.8f;      // least cosine between the normals
-  constexpr float kThickness = 0.3f;  // how far off the plane, of the radius
-  return abs_dot(away, normal) < kThickness * radius && sqr(dot(its_normal, normal)) > sqr(kSlope) * length_squared(its_normal);
+  constexpr float kSlope = 0.8f;  // least cosine between the normals
+  const float off = dot(away, normal), distance = std::sqrt(std::max(length_squared(away) - sqr(off), 0.0f));
+  return is_on_surface(off, distance, radius) && sqr(dot(its_normal, normal)) > sqr(kSlope) * length_squared(its_normal);
 }
 
-// How far estimates by the nearest photons are off on average, relative, where photons lie.
+// How far estimates by the nearest photons are off on average, relative.
 struct PhotonError {
   double noise = 0;  // by chance: falls as more neighbours are averaged
   double blur = 0;   // by the distance of these: falls as there are more photons
@@ -90,12 +98,15 @@ class PhotonMap {
   Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius) const;
   // By the nearest `count` of those within `radius`, weighed by a cone that ends at the farthest. [Jensen 2001, eq. 7.8]
   Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count) const;
-  // Power per area on the side of `normal`, by the nearest `count` within `radius` of those that reach `eye`.
-  Rgb irradiance(Vec3 position, Vec3 normal, float radius, size_t count, const PathState& eye) const;
+  // Power per area on the side of `normal`, by the nearest `count` within `radius` of those that reach `eye`; `farthest`: how far these
+  // are.
+  Rgb irradiance(Vec3 position, Vec3 normal, float radius, size_t count, const PathState& eye, const Scene* scene,
+                 float* farthest = nullptr) const;
   // How many lie within `radius`.
   size_t count(Vec3 position, Vec3 normal, float radius) const;
-  // Of irradiance by `count` within `radius`: noise by the photons' powers, blur by the difference that half of them make.
-  PhotonError error(float radius, size_t count, const PathState& eye) const;
+  // Of irradiance at some of `places` by `count` within `radius`: noise by the photons' powers, blur by the difference that half of them
+  // make.
+  PhotonError error(const std::vector<PathEnd>& places, float radius, size_t count, const PathState& eye) const;
   // The distance of the `count`-th photon.
   float spread(Vec3 position, size_t count) const;
 
