@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .. import camera_path, engine
+from .. import camera_path, engine, presets
 from ..export import ExportError
 from ..export.settings import copy_from_cycles
 
@@ -57,5 +57,32 @@ class GI_OT_render_along(bpy.types.Operator):
         return bpy.ops.render.render("EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT", animation=True)
 
 
-CLASSES = (GI_OT_render_along, GI_OT_copy_from_cycles, GI_OT_follow_cycles)
+class GI_OT_preset(bpy.types.Operator):
+    """Choose an integrator, samples and bounces that suit each other"""
+
+    bl_idname = "gi_engine.preset"
+    bl_label = "Preset"
+    bl_options = {"REGISTER", "UNDO"}
+
+    preset: bpy.props.EnumProperty(
+        name="Preset", items=[(key, preset.label, preset.help) for key, preset in presets.PRESETS.items()]
+    )
+
+    @classmethod
+    def description(cls, context, properties):
+        return presets.PRESETS[properties.preset].help
+
+    def execute(self, context):
+        presets.apply(presets.PRESETS[self.preset], context.scene)
+        return {"FINISHED"}
+
+
+class GI_MT_presets(bpy.types.Menu):
+    bl_label = "Presets"
+
+    def draw(self, context):
+        self.layout.operator_enum("gi_engine.preset", "preset")
+
+
+CLASSES = (GI_OT_preset, GI_MT_presets, GI_OT_render_along, GI_OT_copy_from_cycles, GI_OT_follow_cycles)
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -44,6 +44,7 @@ class GI_RENDER_PT_integrator(RenderPanel, bpy.types.Panel):
         scene = context.scene
         if not native.available():
             self.layout.label(text="The compiled part is missing: see the console", icon="ERROR")
+        self.layout.menu("GI_MT_presets", icon="PRESET")
         column = columns(self.layout)
         column.prop(scene.gi_engine, "integrator")
         own = getattr(scene.gi_engine, scene.gi_engine.integrator, None)

@@ -35,6 +35,9 @@ class Layout:
         category, _, function = name.partition(".")
         assert getattr(getattr(bpy.ops, category), function).idname()
 
+    def menu(self, name, **_):
+        assert hasattr(bpy.types, name)
+
     def column(self, **_):
         return Layout(self.drawn)
 
