@@ -44,9 +44,10 @@ class Result:
 def results(rows: list[Row]) -> list[Result]:
     compare.register_once()
     by_values = [row for row in rows if not row.closure and row.idname not in RANDOM]
-    by_blocks = [row for row in rows if row.closure or row.idname in RANDOM]
+    closures = [row for row in rows if row.closure]
+    at_random = [row for row in rows if not row.closure and row.idname in RANDOM]
     found = []
-    for group, compare_sheet in ((by_values, value_sheet), (by_blocks, block_sheet)):
+    for group, compare_sheet in ((by_values, value_sheet), (closures, block_sheet), (at_random, block_sheet)):
         for i in range(0, len(group), PER_SHEET):
             found += compare_sheet(group[i : i + PER_SHEET])
     return found
