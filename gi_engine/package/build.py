@@ -71,7 +71,6 @@ def compile_native(source: Path, folder: Path, python: str, compiler: str) -> Pa
     run(
         *uv(),
         "build",
-        "--quiet",
         "--wheel",
         "--python",
         python,
