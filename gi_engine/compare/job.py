@@ -79,7 +79,7 @@ class Job:
                 made.replace(goal)
             self.fresh = False
         except OSError as error:
-            raise JobError(f'"{goal}" cannot be written: {error.strerror}') from error
+            raise JobError(f'"{error.filename}" cannot be written: {error.strerror}') from error
         finally:
             self.leave()
         return json.loads((self.folder / "report.json").read_text(encoding="utf-8"))

@@ -36,6 +36,14 @@ def goal(plan: Plan) -> dict:
     return {"sampling": TIMES * plan.seconds if plan.seconds else 300.0}
 
 
+def times_of(plan: Plan) -> float:
+    """How many times as long as an engine's picture it takes; a guess where that is not known."""
+    if isinstance(plan.reference, Path):
+        return 0.0
+    (what, wanted), own = next(iter(goal(plan).items())), {"sampling": plan.seconds, "samples": plan.samples}
+    return wanted / own[what] if own[what] else TIMES
+
+
 def from_file(path: Path, size: tuple[int, int]) -> Reference:
     """Raises PictureError where it is damaged or of another size."""
     pixels = read_exr(path)

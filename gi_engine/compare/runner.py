@@ -14,6 +14,7 @@ from .pictures import PictureError
 from .plan import FIRST_SECONDS, STEP, Plan, cache_folder, content_key, engine_label
 from .reference import Reference
 
+ENGINE_TIMES = 2.3  # an engine's own time, in all: the shorter renders, and the one by another seed
 MOST_SECONDS = 600.0  # of a run until an error is reached
 
 
@@ -63,7 +64,8 @@ class Run:
         self.plan, self.watcher = plan, watcher
         self.result = Comparison(plan)
         self.result.engines = [Rendered(engine, engine_label(engine)) for engine in plan.engines]
-        self.parts = len(plan.engines) + 1
+        # Shares of the time that the reference and each engine will take.
+        self.parts = [reference.times_of(plan), *(len(plan.engines) * [ENGINE_TIMES])]
         self.scratch = plan.output / "images"
 
     def warn(self, text: str) -> None:
@@ -94,7 +96,9 @@ class Run:
             yield child, facts
 
     def tell(self, part: float, label: str, text: str) -> None:
-        self.watcher.progress(min(part / self.parts, 1.0), f"{label}: {text}")
+        number = min(int(part), len(self.parts) - 1)
+        done = sum(self.parts[:number]) + min(part - number, 1.0) * self.parts[number]
+        self.watcher.progress(done / sum(self.parts), f"{label}: {text}")
 
     # The reference
 

@@ -89,8 +89,9 @@ class GI_OT_compare(bpy.types.Operator):
         images = load(job.pictures_of(facts, self.job.folder))
         page = self.job.folder / job.REPORT
         if not bpy.app.background and context.window is not None:
-            if images:
-                show(context, images[0], images[-1])
+            # Later: a modal operator that opens a window is never taken off Blender's list.
+            names, window = [image.name for image in images], context.window
+            bpy.app.timers.register(lambda: show(window, names), first_interval=0.0)
             if context.scene.gi_engine.compare.open_report:
                 bpy.ops.wm.url_open(url=page.as_uri())
         self.report({"INFO"}, f"The comparison is in {page}")
@@ -116,25 +117,31 @@ def load(pictures: dict) -> list:
     return images
 
 
-def show(context, ours, theirs) -> None:
-    """A window with two Image Editors beside each other."""
-    bpy.ops.wm.window_new()
-    window = context.window_manager.windows[-1]
+def still_open(window) -> bool:
+    return window in list(bpy.context.window_manager.windows)
+
+
+def show(parent, names: list[str]) -> None:
+    """A window with two Image Editors beside each other: the first of the images, and the last."""
+    if not names or not still_open(parent):
+        return
+    with bpy.context.temp_override(window=parent):
+        bpy.ops.wm.window_new()
+    window = bpy.context.window_manager.windows[-1]
     area = window.screen.areas[0]
     area.type = "IMAGE_EDITOR"
-    if ours != theirs:
-        with context.temp_override(window=window, screen=window.screen, area=area, region=area.regions[-1]):
+    if len(names) > 1:
+        with bpy.context.temp_override(window=window, screen=window.screen, area=area, region=area.regions[-1]):
             bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
-    beside = sorted(window.screen.areas, key=lambda area: area.x)
-    for area, image in zip(beside, (ours, theirs), strict=False):
-        area.spaces.active.image = image
-    bpy.app.timers.register(lambda: fit(window), first_interval=0.2)  # areas have their sizes after they were drawn
+    # Areas have their places and sizes once they were drawn.
+    bpy.app.timers.register(lambda: fill(window, (names[0], names[-1])), first_interval=0.2)
 
 
-def fit(window) -> None:
-    if window not in list(bpy.context.window_manager.windows):  # closed by now
+def fill(window, names: tuple[str, str]) -> None:
+    if not still_open(window):
         return
-    for area in window.screen.areas:
+    for area, name in zip(sorted(window.screen.areas, key=lambda area: area.x), names, strict=False):
+        area.spaces.active.image = bpy.data.images.get(name)
         region = next(region for region in area.regions if region.type == "WINDOW")
         with bpy.context.temp_override(window=window, screen=window.screen, area=area, region=region):
             bpy.ops.image.view_all(fit_view=True)
