@@ -94,11 +94,12 @@ def write_exr(path: Path, pixels: np.ndarray) -> None:
         return
     import bpy
 
+    from ..bake import save
+
     height, width, _ = pixels.shape
     image = bpy.data.images.new("Compare", width, height, float_buffer=True)
     image.pixels.foreach_set(np.dstack([pixels[::-1], np.ones((height, width))]).astype(np.float32).ravel())
-    image.filepath_raw, image.file_format = str(path), "OPEN_EXR"
-    image.save()
+    save(image, path)
     bpy.data.images.remove(image)
 
 

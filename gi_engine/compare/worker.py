@@ -151,7 +151,7 @@ def render(
         scene.cycles.samples, scene.cycles.time_limit = samples or UNLIMITED, seconds
         scene.cycles.seed = seed
     else:
-        limits = {"samples": samples, "time_limit": seconds, "noise_target": 0.0}
+        limits = {"samples": samples, "time_limit": seconds, "noise_target": 0.0, "denoising": None}
         wishes.overrides = limits | {"integrator": state.engine, "seed": seed, "keep": False, "kept_file": ""}
     target = Path(path)
     set_exr(scene, multilayer=True)

@@ -3,12 +3,14 @@
 import csv
 import json
 
+import bpy
+import cycles
 import numpy as np
 import OpenEXR
 import pytest
 
-from gi_engine import cli
-from gi_engine.compare import child, pictures, reference
+from gi_engine import cli, control
+from gi_engine.compare import child, pictures, plan, reference, runner, worker
 
 SMALL = ("--samples", 16, "--reference-samples", 64, "--threads", 1)
 
@@ -31,6 +33,10 @@ def by_name(facts) -> dict:
 
 
 def test_engines_that_agree(compare, stage, tmp_path):
+    """In the soft light of a wide lamp; our own denoiser is on in the scene, and must not be in the comparison."""
+    stage.lamp.data = bpy.data.lights.new("wide", "AREA")
+    stage.lamp.data.energy, stage.lamp.data.size = 100, 3
+    stage.scene.gi_engine.use_denoising = True
     stage.scene.view_layers[0].use_pass_z = True
     stage.save()
     done, facts = compare("--engines", "path,cycles")
@@ -42,7 +48,9 @@ def test_engines_that_agree(compare, stage, tmp_path):
         assert engine["mean_ratio"] == pytest.approx(1, abs=max(5 * engine["mean_ratio_error"], 0.01))
         assert engine["passes"]["Depth"]["relative_mse"] < 1e-4
         assert all(engine[name] > 0 for name in ("startup", "load", "seconds", "memory", "flip", "relative_mse"))
-    assert by_name(facts)["path"]["rays_per_second"] > 0
+    ours, theirs = (by_name(facts)[name] for name in ("path", "cycles"))
+    assert 0.3 < ours["relative_mse"] / theirs["relative_mse"] < 3 and theirs["relative_mse"] > 1e-4
+    assert ours["rays_per_second"] > 0
     rows = list(csv.DictReader((tmp_path / "report/report.csv").read_text().splitlines()))
     assert [row["engine"] for row in rows] == ["path", "cycles"]
     image = pictures.read_exr(tmp_path / "report" / by_name(facts)["path"]["picture"])
@@ -95,6 +103,55 @@ def test_a_reference_of_another_size_or_damaged_is_named(compare, tmp_path):
     path.write_bytes(path.read_bytes()[:60])
     with pytest.raises(pictures.PictureError, match="is damaged or no EXR"):
         reference.from_file(path, (24, 16))
+    done, facts = compare("--engines", "path", "--reference", path)
+    assert done.code == cli.FAILED and "no reference" in done.err and "is damaged or no EXR" in done.err
+    assert facts["engines"][0]["samples"] == 16 and facts["reference"] is None
+
+
+def test_a_scene_that_one_engine_cannot_render(compare, stage):
+    """Cycles takes a camera without a size, and the other's figures stay."""
+    stage.camera.scale = (0, 0, 0)
+    stage.save()
+    done, facts = compare("--engines", "path,cycles")
+    ours, theirs = (by_name(facts)[name] for name in ("path", "cycles"))
+    assert done.code == cli.FAILED and f"Path Tracing: {ours['error']}" in done.err
+    assert "camera" in ours["error"].lower() and not theirs["error"] and theirs["samples"] == 16
+
+
+def test_an_engine_that_is_missing_is_named(stage, monkeypatch):
+    """As Blender is where the add-on of Cycles is switched off."""
+    bpy.utils.unregister_class(cycles.CyclesRender)
+    try:
+        with pytest.raises(control.RenderError, match="Cycles is not in this Blender"):
+            worker.choose_engine(stage.scene, "cycles")
+    finally:
+        bpy.utils.register_class(cycles.CyclesRender)
+    worker.choose_engine(stage.scene, "cycles")
+
+
+def test_pictures_of_two_sizes_are_not_compared(tmp_path, monkeypatch):
+    monkeypatch.setattr(runner.Run, "show", lambda self: None)
+    run = runner.Run(plan.Plan(tmp_path / "a.blend", ["path", "whitted"], tmp_path, samples=1), runner.Watcher())
+    run.result.reference = reference.Reference("Cycles", np.ones((16, 24, 3), np.float32), 0.0, {}, {})
+    for rendered, size in zip(run.result.engines, ((8, 24, 3), (16, 24, 3)), strict=True):
+        rendered.pixels = np.ones(size, np.float32)
+        rendered.steps = [{"sampling": 1.0, "not_finite": 0, "file": "none.exr"}]
+    run.judge()
+    small, right = run.result.engines
+    assert small.error == "the picture is 24x8 pixels, the reference 24x16: not compared" and not small.figures
+    assert not right.error and right.figures["relative_mse"] == 0
+
+
+def test_packages_that_are_missing_are_named(tmp_path, monkeypatch):
+    """Inside Blender there is no FLIP and no OpenEXR."""
+    monkeypatch.setattr(runner.metrics, "has_flip", lambda: False)
+    monkeypatch.setattr(pictures, "reads_passes", lambda: False)
+    run = runner.Run(plan.Plan(tmp_path / "a.blend", ["path"], tmp_path, samples=1), runner.Watcher())
+    run.name_missing_packages()
+    assert ["FLIP is left out" in w or "passes are left out" in w for w in run.result.warnings] == [True, True]
+    pixels = np.random.default_rng(1).random((5, 7, 3), np.float32)
+    pictures.write_exr(tmp_path / "by_blender.exr", pixels)
+    np.testing.assert_allclose(pictures.read_exr(tmp_path / "by_blender.exr"), pixels, rtol=1e-6)
 
 
 def test_what_cannot_be_asked_for_is_said(gi, stage, tmp_path):
