@@ -1,5 +1,5 @@
 """Inside Blender with a window: F12 ends by itself and makes a picture, Esc ends what would take for ever, with every integrator; so do the
-buttons that bake and that render strategies. Real keys, by xdotool. Quits with exit status 0, or 1 after the first thing that went wrong."""
+buttons that bake, render strategies and compare. Real keys, by xdotool. Quits with exit status 0, or 1 after the first thing that went wrong."""
 
 import os
 import subprocess
@@ -109,6 +109,28 @@ def show_strategies(own):
         print(f"window: render_strategies: {len(list(Path(folder).iterdir()))} files", flush=True)
 
 
+def compare(own):
+    """To its end it shows two pictures beside each other, in a window of their own that is closed here."""
+    settings, windows = own.compare, bpy.context.window_manager.windows
+    with tempfile.TemporaryDirectory() as folder:
+        settings.folder, settings.open_report, settings.seconds = folder, False, 300
+        button(own, "compare", "INVOKE_DEFAULT", 2)
+        yield from cancelled("compare")
+        assert not list(Path(folder).iterdir()), "something is left behind"
+        settings.seconds = 0.5
+        button(own, "compare", "INVOKE_DEFAULT", 2)
+        yield from until(lambda: not is_working("compare"), 200, "compare")
+        yield from until(lambda: len(windows) == 2, 20, "the window of a comparison")
+        yield 2
+        areas = sorted(windows[1].screen.areas, key=lambda area: area.x)
+        shown = [area.spaces.active.image.name for area in areas]
+        print(f"window: compare: {shown}", flush=True)
+        assert shown == ["Compare: Path Tracing", "Compare: Cycles"] and (Path(folder) / "report.html").exists()
+    with bpy.context.temp_override(window=windows[1]):
+        bpy.ops.wm.window_close()
+    yield 1
+
+
 def story():
     scene = bpy.context.scene
     bpy.context.preferences.view.render_display_type = "AREA"
@@ -122,6 +144,7 @@ def story():
         yield from both_keys(scene.gi_engine, item.identifier)
     yield from bake(scene.gi_engine)
     yield from show_strategies(scene.gi_engine)
+    yield from compare(scene.gi_engine)
     # And what was there before still works.
     yield from both_keys(scene.gi_engine, "path")
 
