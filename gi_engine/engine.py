@@ -250,8 +250,9 @@ class GIEngine(bpy.types.RenderEngine):
             self.update_stats("", describe(error))
 
     def __del__(self):
-        if self.viewport:
-            self.viewport.close()
+        with contextlib.suppress(ReferenceError):  # Blender's part of it is gone, as after a final render
+            if self.viewport:
+                self.viewport.close()
         with contextlib.suppress(AttributeError):  # not every version has one
             super().__del__()
 
