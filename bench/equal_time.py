@@ -32,6 +32,7 @@ WAYS = {
     "light": ("GI_ENGINE", "light"),
     "irradiance_cache": ("GI_ENGINE", "irradiance_cache"),
     "photon_map": ("GI_ENGINE", "photon_map"),
+    "photon_map_cached": ("GI_ENGINE", "photon_map", {"global_light": "CACHED"}),
     "sppm": ("GI_ENGINE", "sppm"),
     "vcm": ("GI_ENGINE", "vcm"),
     "cycles": ("CYCLES", ""),
@@ -55,7 +56,7 @@ def render_all(options) -> None:
     gi_engine.register()
     bpy.ops.wm.open_mainfile(filepath=options.child, load_ui=False, use_scripts=False)
     scene = bpy.context.scene
-    engine, integrator = WAYS[options.ways[0]]
+    engine, integrator, *parameters = WAYS[options.ways[0]]
     prepare(scene, SimpleNamespace(engine=engine, pixels=options.pixels, threads=options.threads))
     cycles = scene.cycles
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.blur_glossy = 0.0
@@ -75,6 +76,8 @@ def render_all(options) -> None:
     start = timed(1, 1)  # reading the scene, and one pass of path tracing
     if integrator:
         scene.gi_engine.integrator = integrator
+    for name, value in parameters[0].items() if parameters else ():
+        setattr(getattr(scene.gi_engine, integrator), name, value)
     first = max(timed(1, 1) - start, 0.0)  # what a way does before its passes counts
     samples, seconds = 2, 0.0
     while seconds < 0.3 * min(options.seconds):
