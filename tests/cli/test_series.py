@@ -13,6 +13,7 @@ STEPS = [step.name for step in series.steps()]
 @pytest.fixture
 def figure(gi, stage, tmp_path):
     """Runs the command on a red floor; its pictures by step."""
+    stage.material.use_nodes = True
     stage.material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.8, 0.1, 0.1, 1)
     file = stage.save()
 
