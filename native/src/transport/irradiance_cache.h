@@ -22,11 +22,13 @@ struct IrradianceRecord {
   void write(float* row) const;
   static IrradianceRecord read(const float* row);
 
-  // What it says of another place, and of the normal `bumped`; `turned` is the cosine between that and the surface's own there.
+  // What it says of another place, and of the normal `bumped`; `turned` is the cosine between that and the surface's own there. Below
+  // zero only by as much as the record itself, as colours beyond the gamut are.
   Rgb at(Vec3 place, Vec3 bumped, float turned) const {
     const Vec3 d = place - position;
     const Rgb moved = translation[0] * d.x + translation[1] * d.y + translation[2] * d.z;
-    return positive(irradiance * turned + moved + lateral[0] * bumped.x + lateral[1] * bumped.y + lateral[2] * bumped.z);
+    const Rgb there = irradiance * turned + moved + lateral[0] * bumped.x + lateral[1] * bumped.y + lateral[2] * bumped.z;
+    return max(there, min(irradiance, Rgb()));
   }
 };
 
