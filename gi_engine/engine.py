@@ -18,7 +18,7 @@ from .denoise import denoise
 from .display import duration
 from .export import Exported, ExportError, export
 from .keeping import Keeping, KeepingError, KeptFileError, keeps
-from .passes import NOISY, contract_name, passes_of
+from .passes import NOISY, aovs_of, contract_name, passes_of
 from .session import RenderFailed, Session
 
 WHOLE = 1 << 16  # begin_result clamps it to the border's size
@@ -177,8 +177,9 @@ class GIEngine(bpy.types.RenderEngine):
         return _leaving.is_set() or self.test_break() or control.cancelled()
 
     def show(self, session: Session, result) -> None:
+        aovs = dict(session.scene.film.aovs)
         for blender_pass in result.layers[0].passes:
-            name = contract_name(blender_pass.name)
+            name = blender_pass.name if blender_pass.name in aovs else contract_name(blender_pass.name)
             if name:
                 fill(blender_pass, session.read("Combined" if name == NOISY else name))
         self.update_result(result)
@@ -275,7 +276,7 @@ class GIEngine(bpy.types.RenderEngine):
             _running.pop()
 
     def update_render_passes(self, scene=None, renderlayer=None):
-        for p in passes_of(renderlayer, scene):
+        for p in (*passes_of(renderlayer, scene), *aovs_of(renderlayer)):
             self.register_pass(scene, renderlayer, p.blender_name, len(p.channels), p.channels, p.kind)
 
 

@@ -16,7 +16,7 @@ def describe(scene: Scene, settings: Settings) -> list[str]:
     """Lines about one exported view layer. Raises what building the native scene raises (ValueError, …)."""
     lines = [
         f"camera: {named(scene.camera.name)}, {CAMERAS.get(scene.camera.kind, scene.camera.kind)}",
-        f"picture: {scene.film.width} x {scene.film.height} pixels{border(scene)}; passes {', '.join(scene.film.passes)}",
+        f"picture: {scene.film.width} x {scene.film.height} pixels{border(scene)}; passes {', '.join([*scene.film.passes, *dict(scene.film.aovs)])}",
         f"integrator: {settings.integrator}, {limits(settings)}",
         f"objects: {counted(sum(i.count for i in scene.instances), 'instance')} of {counted(len(scene.meshes), 'mesh', 'meshes')}",
         triangles(scene),

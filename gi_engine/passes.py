@@ -60,6 +60,12 @@ def passes_of(view_layer, scene=None) -> list[Pass]:
     return [p for p in PASSES if not p.wanted or any(flag(view_layer, scene, path) for path in p.wanted)]
 
 
+def aovs_of(view_layer) -> list[Pass]:
+    """The passes that AOV outputs of node trees fill. Blender marks those whose names clash."""
+    kinds = {"COLOR": "RGBA", "VALUE": "X"}
+    return [Pass(aov.name, aov.name, kinds[aov.type], aov.type) for aov in view_layer.aovs if aov.is_valid]
+
+
 def flag(view_layer, scene, path: str) -> bool:
     owner = scene if path.startswith(OF_SCENE) else view_layer
     for name in path.removeprefix(OF_SCENE).split("."):

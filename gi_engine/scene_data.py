@@ -160,6 +160,8 @@ class Film:
     transparent_glass: bool = False
     transparent_roughness: float = 0.1
     passes: list[str] = field(default_factory=lambda: ["Combined"])  # Cycles' 5.x names
+    # Passes that AOV outputs of node trees fill: name, channels (4 or 1). Ops refer to the index.
+    aovs: list[tuple[str, int]] = field(default_factory=list)
 
 
 LIGHTMAP_CONTENTS = (

@@ -83,7 +83,7 @@ def begin(context, integrator: str | None = None) -> Pyramid:
     if not has_strategies(chosen["parameters"]):
         able = ", ".join(d["id"] for d in native.integrators() if has_strategies(d["parameters"]))
         raise StrategyError(f'integrator "{chosen["id"]}" has no strategies to show; these have: {able}')
-    found.scene.film.passes = ["Combined"]
+    found.scene.film.passes, found.scene.film.aovs = ["Combined"], []
     max_bounces = int(settings.parameters["max_bounces"])
     wanted = [(way, weighted) for way in techniques(max_bounces) for weighted in (True, False)]
     session = Session(found.scene, settings)

@@ -108,7 +108,7 @@ def make_job(exported, camera, film: Film, own, resolved) -> Job:
         denoising = Denoising(own.preview_denoising_input_passes, "FAST", own.preview_denoising_quality)
     passes = ["Combined"] + [own.viewport_pass] * (own.viewport_pass != "Combined")
     passes += [name for name in (denoising.guides.values() if denoising else ()) if name not in passes]
-    film = dataclasses.replace(film, passes=passes)
+    film = dataclasses.replace(film, passes=passes, aovs=[])
     settings = dataclasses.replace(
         exported.settings, samples=resolved.preview_samples or 1 << 20, denoising=denoising, kept_file=""
     )

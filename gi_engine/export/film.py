@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..passes import NOISY, passes_of
+from ..passes import NOISY, aovs_of, passes_of
 from ..scene_data import Denoising, Film
 
 
@@ -39,6 +39,7 @@ def export_film(scene, view_layer, settings, size: tuple[int, int]) -> Film:
         transparent_glass=settings.transparent_glass,
         transparent_roughness=settings.transparent_roughness,
         passes=wanted_passes(scene, view_layer),
+        aovs=[(aov.name, len(aov.channels)) for aov in aovs_of(view_layer)],
     )
 
 

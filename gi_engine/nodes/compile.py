@@ -7,20 +7,29 @@ from __future__ import annotations
 
 import importlib
 import re
-import sys
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 from ..scene_data import Program, Scene
 from .attributes import look_up
 from .node_builder import NodeBuilder, by_identifier
-from .program import COLOR, FLOAT, VECTOR, ProgramBuilder, Value
+from .program import COLOR, FLOAT, ProgramBuilder, Value
 from .rules import CLOSURE_RULES, RULES
+from .trees import (
+    KIND_OF_SOCKET,
+    Context,
+    Source,
+    contexts,
+    deep_recursion,
+    group_output,
+    has_nodes,
+    inlined,
+    is_inlined,
+    kind_of,
+)
 
 for _family in ("values", "math", "color", "vector", "input", "textures", "closures", "volume"):
     importlib.import_module(f"{__package__}.rules_{_family}")
 
-KIND_OF_SOCKET = {"VALUE": FLOAT, "INT": FLOAT, "BOOLEAN": FLOAT, "VECTOR": VECTOR, "ROTATION": VECTOR, "RGBA": COLOR}
 DEFAULT_GREY = 0.8  # of objects without a material
 MULTI_GGX = 3  # as in rules_closures
 # What Cycles leaves out of the trees that it makes.
@@ -49,30 +58,6 @@ COMBINING = {"ShaderNodeMixShader", "ShaderNodeAddShader"}
 MOST_CLOSURES = 24  # Bsdf::kMaxLobes
 AS_CYCLES = "as in Cycles"
 NUMBERED = re.compile(r"^\d+_")
-DEEPEST = 20000  # Python's recursion limit while a tree is compiled: some frames for each node of a chain
-
-
-@dataclass(frozen=True)
-class Context:
-    """A node tree and the group node that it stands for."""
-
-    tree: object
-    group: object = None
-    parent: Context | None = None
-
-    @property
-    def key(self) -> tuple:
-        return (self.parent.key if self.parent else ()) + ((self.group.as_pointer(),) if self.group else ())
-
-
-@dataclass(frozen=True)
-class Source:
-    """Where an input socket gets its value from: an output socket of a node, or, where `node` is None, `socket` itself."""
-
-    context: Context
-    node: object
-    socket: object
-    through: tuple = ()  # kinds of the sockets of groups and muted nodes that the value passes on its way, last one first
 
 
 class Compiler:
@@ -131,6 +116,7 @@ class Compiler:
         walker = TreeWalker(self, f"material '{material.name}'", material)
         with deep_recursion():
             walker.surface(material, walker.tree)
+            walker.aovs()
             volume = self.volume(walker, material)
         program = walker.builder.finish(material.name)
         program.volume_program, program.only_volume = volume, volume is not None and not walker.has_surface
@@ -172,9 +158,10 @@ class Compiler:
     def _emitter(self, owner, what: str) -> Program:
         walker = TreeWalker(self, f"{what} '{owner.name}'", owner)
         output = walker.tree.get_output_node("CYCLES")
-        if output is not None:
-            walker.warn_of_volume(Context(walker.tree), output)
-            with deep_recursion():
+        with deep_recursion():
+            walker.aovs()
+            if output is not None:
+                walker.warn_of_volume(Context(walker.tree), output)
                 walker.closure_input(Context(walker.tree), output.inputs["Surface"], walker.builder.constant(1.0))
         return walker.noted(walker.builder.finish(owner.name))
 
@@ -230,6 +217,17 @@ class TreeWalker:
         if not self.has_surface and volume is not None and self.resolve(context, volume).node is not None:
             self.builder.op("transparent", 1.0, (1.0, 1.0, 1.0))
         self.closure_input(context, output.inputs["Surface"], self.builder.constant(1.0))
+
+    def aovs(self) -> None:
+        """The passes that AOV outputs fill, in groups too; what is linked to the output or not, they count."""
+        film = self.compiler.scene.film
+        index_of = {name: (i, channels) for i, (name, channels) in enumerate(film.aovs if film else ())}
+        for context in contexts(Context(self.tree)):
+            for node in context.tree.nodes:
+                if node.bl_idname == "ShaderNodeOutputAOV" and node.aov_name in index_of and not node.mute:
+                    index, channels = index_of[node.aov_name]
+                    op, socket = ("aov_color", "Color") if channels == 4 else ("aov_value", "Value")
+                    self.builder.op(op, self.value(context, node.inputs[socket]), imm=(index,))
 
     def noted(self, program: Program) -> Program:
         program.needs, program.approximated = sorted(self.needs), list(self.approximated.values())
@@ -409,41 +407,3 @@ class TreeWalker:
             before = self.builder.op("bump_shift", width, imm=(axis,))
             yield
             self.builder.op("bump_restore", *before)
-
-
-def kind_of(socket) -> str:
-    return KIND_OF_SOCKET.get(socket.type, FLOAT)
-
-
-def inlined(owner):
-    """From Blender 5.0 on: the tree without groups, zones, closures, bundles and menus. None before, and where nothing is left of
-    the tree: that it has a cycle is then found by walking it as it is."""
-    made = owner.inline_shader_nodes() if is_inlined(owner) and owner.node_tree is not None else None
-    return made if made and made.node_tree.get_output_node("CYCLES") else None
-
-
-def is_inlined(owner) -> bool:
-    """From Blender 5.0 on renderers get trees without groups, where links lead from node to node: values that come out of
-    nodes are not converted at the borders of groups. Materials and worlds always have their nodes in use, too."""
-    return hasattr(owner, "inline_shader_nodes")
-
-
-def has_nodes(owner) -> bool:
-    return owner.node_tree is not None and (is_inlined(owner) or owner.use_nodes)
-
-
-@contextmanager
-def deep_recursion():
-    limit = sys.getrecursionlimit()
-    sys.setrecursionlimit(max(limit, DEEPEST))
-    try:
-        yield
-    finally:
-        sys.setrecursionlimit(limit)
-
-
-def group_output(node):
-    if node.node_tree is None:
-        return None
-    outputs = [n for n in node.node_tree.nodes if n.type == "GROUP_OUTPUT"]
-    return next((n for n in outputs if n.is_active_output), outputs[0] if outputs else None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bpy
+from bl_ui.properties_view_layer import ViewLayerAOVPanelHelper
 
 from .. import native
 from ..export.settings import SHARED, value_of
@@ -293,6 +294,11 @@ class GI_VIEWLAYER_PT_passes(Panel, bpy.types.Panel):
         column.prop(layer.gi_engine, "use_pass_albedo")
 
 
+class GI_VIEWLAYER_PT_aovs(Panel, ViewLayerAOVPanelHelper, bpy.types.Panel):
+    bl_context = "view_layer"
+    bl_parent_id = "GI_VIEWLAYER_PT_passes"
+
+
 class GI_VIEWLAYER_PT_override(Panel, bpy.types.Panel):
     bl_label = "Override and Filter"
     bl_context = "view_layer"
@@ -327,6 +333,7 @@ CLASSES = (
     GI_RENDER_PT_performance,
     GI_RENDER_PT_compositor,
     GI_VIEWLAYER_PT_passes,
+    GI_VIEWLAYER_PT_aovs,
     GI_VIEWLAYER_PT_override,
 )
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -46,6 +46,10 @@ class Layout:
     def label(self, **_):
         pass
 
+    def template_list(self, kind, _id, owner, name, *_, **__):
+        assert hasattr(bpy.types, kind)
+        self.prop(owner, name)
+
     def template_preview(self, item):
         self.drawn.append(item.name)
 

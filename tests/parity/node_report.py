@@ -34,6 +34,7 @@ WITHOUT_ROWS = {
     "NodeEvaluateClosure": ZONES,
     "NodeJoinBundle": ZONES,
     "NodeSeparateBundle": ZONES,
+    "ShaderNodeOutputAOV": "output: tests/addon/test_aovs.py",
     "ShaderNodeOutputMaterial": "output: every row goes through it",
     "ShaderNodeOutputWorld": "output: tests/parity/cases_lights.py",
     "ShaderNodeOutputLight": "output: tests/parity/cases_lights.py",

@@ -79,7 +79,7 @@ nb::dict progress_dict(const Session& session) {
 
 nb::ndarray<nb::numpy, float> read_pass(const Session& session, const std::string& pass) {
   const FilmSpec& spec = session.film().spec();
-  const int channels = Film::channels(pass);
+  const int channels = session.film().channels(pass);
   require(channels > 0, "there is no pass named '" + pass + "'");
   const size_t h = size_t(spec.region_height()), w = size_t(spec.region_width()), c = size_t(channels);
   auto* pixels = new std::vector<float>(h * w * c);

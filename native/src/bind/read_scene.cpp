@@ -4,6 +4,7 @@
 #include "bind/bind.h"
 
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -292,6 +293,7 @@ FilmSpec read_film(nb::handle film) {
   f.transparent = r.get<bool>("transparent"), f.transparent_glass = r.get<bool>("transparent_glass");
   f.transparent_roughness = r.real("transparent_roughness");
   f.passes = r.get<std::vector<std::string>>("passes");
+  for (const auto& [name, channels] : r.get<std::vector<std::pair<std::string, int>>>("aovs")) f.aovs.push_back({name, channels});
   return f;
 }
 

@@ -8,17 +8,6 @@
 
 namespace gi {
 
-// Averaged over the samples whose light is a finite number, over all samples, or of the first sample (indices and depth
-// do not average).
-enum class Keep { kLight, kMean, kFirst };
-
-struct PassRule {
-  const char* name;
-  int channels;
-  Keep keep;
-  void (*add)(const PixelSample&, float exposure, float* sum);
-};
-
 namespace {
 
 void add_number(float x, float* sum) { *sum += std::isfinite(x) ? x : 0.0f; }
@@ -65,8 +54,10 @@ const PassRule* find_rule(const std::string& name) {
 
 }  // namespace
 
-int Film::channels(const std::string& pass) {
+int Film::channels(const std::string& pass) const {
   if (pass == kSampleCount) return 1;
+  for (const Aov& aov : spec_.aovs)
+    if (pass == aov.name) return aov.channels;
   const PassRule* rule = find_rule(pass);
   return rule ? rule->channels : 0;
 }
@@ -88,7 +79,14 @@ Film::Film(FilmSpec spec) : spec_(std::move(spec)), filter_(spec_.filter, spec_.
     const PassRule* rule = find_rule(name);
     require(rule, "there is no pass named '" + name + "'");
     has_data_passes_ = has_data_passes_ || rule->keep != Keep::kLight;
-    layers_.push_back({rule, std::vector<float>(pixels * size_t(rule->channels), 0.0f)});
+    layers_.push_back({rule, 0, std::vector<float>(pixels * size_t(rule->channels), 0.0f)});
+  }
+  for (const Aov& aov : spec_.aovs) {
+    require(!find_rule(aov.name) && aov.name != kSampleCount, "an AOV has the name of a pass, '" + aov.name + "'");
+    require(aov.channels == 1 || aov.channels == 4, "the AOV '" + aov.name + "' must have 1 or 4 channels");
+    aov_rules_.push_back({aov.name.c_str(), aov.channels, Keep::kMean, nullptr});
+    layers_.push_back({&aov_rules_.back(), 4 * (aov_rules_.size() - 1), std::vector<float>(pixels * size_t(aov.channels), 0.0f)});
+    has_data_passes_ = true;
   }
   moments_.resize(pixels);
 }
@@ -120,7 +118,10 @@ void Film::add_row(int tile, int y, int pass, const PixelSample* samples) {
     if (rule.keep == Keep::kFirst && pass > 0) continue;
     float* sum = layer.sum.data() + first * size_t(rule.channels);
     for (int i = 0; i < width; ++i, sum += rule.channels)
-      if (good[i] || rule.keep != Keep::kLight) rule.add(samples[i], spec_.exposure, sum);
+      if (!rule.add) {
+        for (int k = 0; k < rule.channels; ++k) add_number(samples[i].aovs[layer.aov + size_t(k)], sum + k);
+      } else if (good[i] || rule.keep != Keep::kLight)
+        rule.add(samples[i], spec_.exposure, sum);
   }
 }
 

@@ -2,8 +2,10 @@
 // A pixel's samples are added in the order of the passes, so the image does not depend on threads.
 #pragma once
 #include <atomic>
+#include <deque>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,6 +14,12 @@
 #include "film/splats.h"
 
 namespace gi {
+
+// A pass that node trees fill by AOV outputs.
+struct Aov {
+  std::string name;
+  int channels = 4;  // or 1
+};
 
 struct FilmSpec {
   int width = 0, height = 0;                // the full frame
@@ -22,6 +30,7 @@ struct FilmSpec {
   bool transparent = false, transparent_glass = false;
   float transparent_roughness = 0.1f;
   std::vector<std::string> passes{"Combined"};
+  std::vector<Aov> aovs;
   int region_width() const { return x1 - x0; }
   int region_height() const { return y1 - y0; }
 };
@@ -42,10 +51,21 @@ struct PixelSample {
   bool has_uv = false;
   float object_index = 0, material_index = 0;
   float cache_record = 0;  // 1 where a record of an irradiance cache lies
+  std::span<float> aovs = {};  // four for each of the film's; none: not asked for
   float photons = 0, photon_density = 0, photon_radius = 0;  // in the pixel; per m²; m within which they are averaged
 };
 
-struct PassRule;  // what a pass holds and how it is averaged: film.cpp
+// Averaged over the samples whose light is a finite number, over all samples, or of the first sample (indices and depth
+// do not average).
+enum class Keep { kLight, kMean, kFirst };
+
+// What a pass holds.
+struct PassRule {
+  const char* name;
+  int channels;
+  Keep keep;
+  void (*add)(const PixelSample&, float exposure, float* sum);  // null: an AOV
+};
 
 struct Tile {
   int x0, y0, x1, y1;  // within the region
@@ -63,6 +83,7 @@ class Film {
   bool wants(const std::string& pass) const;
   // Whether anything but light is asked for.
   bool has_data_passes() const { return has_data_passes_; }
+  size_t aov_floats() const { return 4 * spec_.aovs.size(); }  // of one sample
   // Adds one sample to each pixel of a row of the tile; `y` within the region.
   void add_row(int tile, int y, int pass, const PixelSample* samples);
 
@@ -75,7 +96,7 @@ class Film {
   void end_splats(bool finished);  // of each pass
 
   // Mean of a pass, (region height × region width × channels); "Sample Count" is the number itself.
-  static int channels(const std::string& pass);  // 0 if there is no such pass
+  int channels(const std::string& pass) const;  // 0 if there is no such pass
   void read(const std::string& pass, float* out) const;
 
   // The 95th percentile over pixels of the standard error of luminance relative to the pixel (but no less than to a
@@ -87,6 +108,7 @@ class Film {
  private:
   struct Layer {
     const PassRule* rule;
+    size_t aov;  // first of its floats in a sample; of an AOV
     std::vector<float> sum;
   };
   // Of a pixel: how many samples, how many whose light is a finite number, and the moments of these.
@@ -100,6 +122,7 @@ class Film {
   FilmSpec spec_;
   PixelFilter filter_;
   std::vector<Tile> tiles_;
+  std::deque<PassRule> aov_rules_;
   std::vector<Layer> layers_;
   bool has_data_passes_ = false;
   std::vector<Moments> moments_;

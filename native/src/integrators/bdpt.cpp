@@ -443,6 +443,7 @@ class BdptIntegrator final : public Integrator {
       sample.alpha -= average(path.throughput);
       return Rgb();
     }
+    path.record_world(context, sample);
     const uint32_t visibility = visibility_of(path.state.kind);
     Rgb sum;
     for (uint32_t sun = 0; sun < context.lights.sun_count(); ++sun) {

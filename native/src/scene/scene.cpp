@@ -289,6 +289,11 @@ void Scene::shade(ShadingPoint& point, Bsdf& bsdf) const {
   bsdf.finish(point.wo);
 }
 
+void Scene::add_aovs(const ShadingPoint& point, std::span<float> aovs) const {
+  const int program = point.instance == kNoId ? data_.world.program : material_of(point.instance, point.triangle);
+  if (program >= 0 && material(program).program.has_aovs()) material(program).program.add_aovs(point, *resources_, aovs);
+}
+
 Rgb Scene::emission(ShadingPoint& point) const { return run_emission(material_of(point.instance, point.triangle), point); }
 
 Rgb Scene::run_emission(int program, ShadingPoint& point) const {

@@ -71,6 +71,8 @@ class Scene {
   void shade(ShadingPoint& point, Bsdf& bsdf) const;
   Rgb emission(ShadingPoint& point) const;      // of the surface, towards point.wo
   Rgb transparency(ShadingPoint& point) const;  // of the surface, straight through
+  // What AOV outputs of the surface, or of the world, add.
+  void add_aovs(const ShadingPoint& point, std::span<float> aovs) const;
   Rgb world_radiance(Vec3 direction, const PathState& path) const;
   Rgb run_emission(int program, ShadingPoint& point) const;  // of a lamp's or the world's program
 

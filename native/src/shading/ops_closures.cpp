@@ -125,6 +125,15 @@ void metallic(const Operands& o, ShadeState& s) {
   add_facets(s, Rgb(o.f(0)), o.imm(10), visible_normal(s, n), a.tangent, [&]<class L>() { return L::reflection(a.alpha_x, a.alpha_y, f); });
 }
 
+// Films that lack the AOV, as those of bakes, are not written to.
+void aov(const Operands& o, ShadeState& s, const float (&value)[4]) {
+  const size_t first = 4 * size_t(o.imm(1));
+  for (size_t k = 0; first + 4 <= s.aovs.size() && k < 4; ++k) s.aovs[first + k] += value[k];
+}
+bool any_index(const int32_t* immediates, size_t) { return immediates[0] >= 0; }
+void aov_color(const Operands& o, ShadeState& s) { aov(o, s, {o.v(0).x, o.v(0).y, o.v(0).z, 1.0f}); }
+void aov_value(const Operands& o, ShadeState& s) { aov(o, s, {o.f(0), 0, 0, 0}); }
+
 const Op kOps[] = {
     {"mix_weights", "ff", "ff", 0, OpKind::kPure, mix_weights},
     {"emission", "", "fvf", 0, OpKind::kClosure, emission, kAddsEmission},
@@ -141,6 +150,8 @@ const Op kOps[] = {
     {"refraction", "", "fvffv", 1, OpKind::kClosure, refraction, kAddsLobe},
     {"glass", "", "fvffvff", 1, OpKind::kClosure, glass, kAddsLobe},
     {"metallic", "", "fvvfffvvff", 2, OpKind::kClosure, metallic, kAddsLobe},
+    {"aov_color", "", "v", 1, OpKind::kClosure, aov_color, kAddsAov, any_index},
+    {"aov_value", "", "f", 1, OpKind::kClosure, aov_value, kAddsAov, any_index},
 };
 
 }  // namespace

@@ -18,6 +18,7 @@ Program::Program(std::string name, std::vector<int32_t> code, std::vector<float>
       tables_(std::move(tables)) {
   check();
   fold_constants();
+  if (effects_of_ops() & kAddsAov) aovs_ = reduced_to(kAddsAov);
   drop_all_but(kAddsLobe | kAddsEmission | kAddsTransparency);
   summarise();
   if (effects_ & kAddsTransparency) transparency_ = reduced_to(kAddsTransparency);
@@ -75,6 +76,13 @@ void Program::run(ShadingPoint& point, const ShaderResources& resources, Bsdf* b
   std::copy(constants_.begin(), constants_.end(), registers);
   ShadeState state{point, resources, tables_.data(), bsdf, medium};
   run_code(registers, state);
+}
+
+void Program::add_aovs(ShadingPoint point, const ShaderResources& resources, std::span<float> aovs) const {
+  float registers[kMaxRegisters + 2];
+  std::copy(aovs_->constants_.begin(), aovs_->constants_.end(), registers);
+  ShadeState state{point, resources, tables_.data(), nullptr, nullptr, aovs};
+  aovs_->run_code(registers, state);
 }
 
 void Program::run_code(float* registers, ShadeState& state) const {
@@ -189,9 +197,14 @@ bool Program::uses(std::string_view name) const {
   return found;
 }
 
+uint8_t Program::effects_of_ops() const {
+  uint8_t effects = 0;
+  for_each_instruction(code_, [&](size_t, const Instruction& i) { effects |= i.op.effects; });
+  return effects;
+}
+
 void Program::summarise() {
-  effects_ = 0;
-  for_each_instruction(code_, [&](size_t, const Instruction& i) { effects_ |= i.op.effects; });
+  effects_ = effects_of_ops();
   sees_view_ = std::any_of(std::begin(kViewOps), std::end(kViewOps), [&](const char* name) { return uses(name); });
   steps_.clear();
   std::vector<uint32_t> step_at(code_.size() + 1, 0);
@@ -257,7 +270,7 @@ void Program::drop_all_but(uint8_t effects) {
 
 std::shared_ptr<Program> Program::reduced_to(uint8_t effects) const {
   auto reduced = std::make_shared<Program>(*this);
-  reduced->transparency_.reset(), reduced->emission_.reset();
+  reduced->transparency_.reset(), reduced->emission_.reset(), reduced->aovs_.reset();
   reduced->drop_all_but(effects);
   reduced->summarise();
   reduced->pack_registers();

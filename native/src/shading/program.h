@@ -28,6 +28,7 @@ struct ShadeState {
   const float* tables;               // the program's lookup tables (ramps, curves)
   Bsdf* bsdf;                        // where closures go; null when only values are wanted
   Medium* medium = nullptr;          // where those of a volume go
+  std::span<float> aovs = {};        // where AOV outputs add, four floats each
 };
 
 // Access to one instruction's operands, in the order of its signature: outputs, inputs, immediates.
@@ -60,7 +61,7 @@ enum class OpKind : uint8_t {
   kRestore,
 };
 // What a closure op adds, for the programs specialised to one question, and whether it looks at the point to do so.
-enum ClosureEffect : uint8_t { kAddsLobe = 1, kAddsEmission = 2, kAddsTransparency = 4, kSeesPoint = 8 };
+enum ClosureEffect : uint8_t { kAddsLobe = 1, kAddsEmission = 2, kAddsTransparency = 4, kSeesPoint = 8, kAddsAov = 16 };
 
 struct Op {
   const char* name;
@@ -89,6 +90,9 @@ class Program {
   static constexpr int kMaxUnpacked = 1 << 20;
 
   void run(ShadingPoint& point, const ShaderResources& resources, Bsdf* bsdf, Medium* medium = nullptr) const;
+  // What AOV outputs add at the point: four floats for each of the film's AOVs. The program itself leaves them out.
+  bool has_aovs() const { return aovs_ != nullptr; }
+  void add_aovs(ShadingPoint point, const ShaderResources& resources, std::span<float> aovs) const;
   int register_count() const { return register_count_; }
   // The part of the program that decides transparency (shadow rays), or emission (light sampling).
   const Program& transparency_program() const { return *transparency_; }
@@ -113,6 +117,7 @@ class Program {
   void drop_all_but(uint8_t effects);
   void pack_registers();
   void summarise();
+  uint8_t effects_of_ops() const;
   bool uses(std::string_view name) const;
   std::optional<Rgb> find_constant_emission() const;
   void run_code(float* registers, ShadeState& state) const;
@@ -133,7 +138,7 @@ class Program {
   uint8_t effects_ = 0;
   bool sees_view_ = false;
   std::optional<Rgb> constant_emission_;
-  std::shared_ptr<Program> transparency_, emission_;
+  std::shared_ptr<Program> transparency_, emission_, aovs_;
 };
 
 }  // namespace gi

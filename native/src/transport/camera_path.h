@@ -50,6 +50,8 @@ void for_each_tile(const RenderContext& context, int pass, Film& film, const Beg
     for (int y = tile.y0; y < tile.y1; ++y) {
       const CameraRow row(context, film, spec.x0 + tile.x0, spec.y0 + y, pass);
       PixelSample samples[CameraRow::kWidth];
+      std::vector<float> aovs(CameraRow::kWidth * film.aov_floats());
+      for (size_t i = 0; i < CameraRow::kWidth; ++i) samples[i].aovs = std::span(aovs).subspan(i * film.aov_floats(), film.aov_floats());
       for (int i = 0; i < tile.x1 - tile.x0; ++i) {
         if (context.lightmap && !context.lightmap->covers(spec.x0 + tile.x0 + i, spec.y0 + y)) continue;
         Sampler sampler = row.samplers.sampler(i);
@@ -102,9 +104,16 @@ struct CameraPath {
       sample.alpha -= average(throughput);
       return Rgb();
     }
+    record_world(context, sample);
     const Rgb beyond = light_beyond(context, ray, origin, mode, state);
     if (seen_from_camera) sample.environment += throughput * beyond;
     return beyond;
+  }
+
+  // AOVs of the world, where the camera sees it.
+  void record_world(const RenderContext& context, PixelSample& sample) const {
+    if (seen_from_camera && !sample.has_surface && !sample.aovs.empty())
+      context.scene.add_aovs(context.scene.world_point(ray.direction, state), sample.aovs);
   }
 
   // Past its last bounce the path only looks for luminaires. What it finds on the surface that it met; nothing if that lets
@@ -122,6 +131,7 @@ struct CameraPath {
   ShadingPoint arrive(const RenderContext& context, const Film& film, const CameraRay& camera, const Hit& hit, Bsdf& bsdf,
                       PixelSample& sample) const {
     ShadingPoint point = context.scene.shading_point(ray, hit, state, footprint(camera, hit));
+    if (state.depth == 0 && !sample.has_surface && !sample.aovs.empty()) context.scene.add_aovs(point, sample.aovs);
     context.scene.shade(point, bsdf);
     if (context.lightmap && state.depth == 0) context.lightmap->adapt(bsdf, point.wo, point.ng, point.ns);
     if (state.depth == 0 && film.has_data_passes()) record_surface(context, point, bsdf, sample);
