@@ -3,11 +3,12 @@
     python bench/equal_time.py [--pixels N] [--seconds S …] [--seeds N] [--reference S] [--ways NAME …] [WORD …]
 
 Each way renders each scene (files, or words in names of the shared scenes) for about S seconds of sampling, once per seed, in a process of
-its own. The error is the relative mean squared one, (x − r)² / (r² + (mean r / 10)²), of the worst pixels without a thousandth; `spread` is
-the same between seeds, which no difference between the engines can touch, nor what a biased way is off; `blocks` the error of means over
-8 x 8 pixels, in which noise of single pixels fades and blotches stay. The reference is a long render by
-another seed and the unbiased way that is least noisy per second, or the way --by. Denoising, adaptive sampling, clamping and Filter
-Glossy are off, caustics are on, bounces are the scene's own. Replaces the scenes' rows in bench/results/equal_time.json and .md, and
+its own. The error is the relative mean squared one, (x − r) (x − s) / (m² + (mean m / 10)²), of the worst pixels without a thousandth: r and
+s are two long renders by other seeds and m their mean, so that their own noise cancels. `spread` is the same between seeds, which no
+difference between the engines can touch, nor what a biased way is off; `blocks` the error of means over 8 x 8 pixels, in which noise of
+single pixels fades and blotches stay. The references are by the unbiased way that is least noisy per second, or the way --by. Denoising,
+adaptive sampling, clamping and Filter Glossy are off, caustics are on, bounces are the scene's own. Replaces the scenes' rows in
+bench/results/equal_time.json and .md, and
 their pictures side by side."""
 
 from __future__ import annotations
@@ -130,10 +131,13 @@ def run_child(file: Path, way: str, options, seconds, seeds: int, first_seed: in
     return found
 
 
-def relative_error(image: np.ndarray, reference: np.ndarray) -> float:
-    floor = (0.1 * reference.mean()) ** 2
-    errors = ((image - reference) ** 2 / (reference**2 + floor)).mean(-1).ravel()
-    return float(np.sort(errors)[: math.ceil(0.999 * len(errors))].mean())
+def relative_error(image: np.ndarray, references: list[np.ndarray]) -> float:
+    mean = np.mean(references, 0)
+    square = np.prod([image - r for r in references], 0) if len(references) == 2 else (image - mean) ** 2
+    weight = 1.0 / (mean**2 + (0.1 * mean.mean()) ** 2)
+    order = np.argsort((((image - mean) ** 2) * weight).mean(-1).ravel())
+    errors = (square * weight).mean(-1).ravel()[order]
+    return float(errors[: math.ceil(0.999 * len(errors))].mean())
 
 
 def in_blocks(image: np.ndarray) -> np.ndarray:
@@ -144,7 +148,7 @@ def in_blocks(image: np.ndarray) -> np.ndarray:
 def spread(images: list[np.ndarray], reference: np.ndarray) -> float:
     """Relative variance of one image, by differences in pairs."""
     pairs = [(a, b) for i, a in enumerate(images) for b in images[i + 1 :]]
-    return float(np.mean([relative_error(reference + (a - b) / math.sqrt(2), reference) for a, b in pairs]))
+    return float(np.mean([relative_error(reference + (a - b) / math.sqrt(2), [reference]) for a, b in pairs]))
 
 
 def measure_scene(file: Path, options) -> dict:
@@ -154,7 +158,8 @@ def measure_scene(file: Path, options) -> dict:
     calmest = options.by or min(
         (w for w in UNBIASED if w in options.ways), key=lambda w: spread(last[w], rough), default=UNBIASED[0]
     )
-    reference = run_child(file, calmest, options, [options.reference], 1, 7)[0]["image"]
+    references = [o["image"] for o in run_child(file, calmest, options, [options.reference], 2, 7)]
+    reference = np.mean(references, 0)
     row = {"scene": file.stem, "reference": calmest, **{name: getattr(options, name) for name in HOW}, "ways": {}}
     for way in options.ways:
         row["ways"][way] = []
@@ -164,9 +169,9 @@ def measure_scene(file: Path, options) -> dict:
                 {
                     "seconds": float(np.mean([o["seconds"] for o in group])),
                     "samples": group[0]["samples"],
-                    "error": float(np.mean([relative_error(o["image"], reference) for o in group])),
+                    "error": float(np.mean([relative_error(o["image"], references) for o in group])),
                     "blocks": float(
-                        np.mean([relative_error(in_blocks(o["image"]), in_blocks(reference)) for o in group])
+                        np.mean([relative_error(in_blocks(o["image"]), [*map(in_blocks, references)]) for o in group])
                     ),
                     "spread": spread([o["image"] for o in group], reference),
                 }

@@ -18,7 +18,7 @@ from .lights import export_light
 from .mesh import export_mesh
 from .objects import Collected, collect, place
 from .places import read_places
-from .settings import export_settings, resolve
+from .settings import export_settings, resolve, unheeded
 from .shaders import Shaders
 from .warnings import Warnings
 from .world import export_world
@@ -78,18 +78,21 @@ def export(
         warnings.add("motion blur is not supported yet; rendered without")
     release_scratch()
     settings = export_settings(scene, view_layer, descriptors, integrator)
-    warn_of_needs(out, settings.integrator, descriptors, warnings)
+    chosen = next((d for d in descriptors if d["id"] == settings.integrator), None)
+    if chosen:
+        warn_of_needs(out, chosen, warnings)
+        for text in unheeded(scene, chosen):
+            warnings.add(text)
     approximations.note(out.programs)
     return Exported(out, settings, warnings.messages())
 
 
-def warn_of_needs(out: Scene, integrator: str, descriptors: list[dict], warnings: Warnings) -> None:
+def warn_of_needs(out: Scene, chosen: dict, warnings: Warnings) -> None:
     """One warning for each thing that materials have and the integrator does not carry."""
-    chosen = next((d for d in descriptors if d["id"] == integrator), {})
     for program in out.programs:
         for need in program.needs:
-            if need not in chosen.get("carries", ()):
-                warnings.add(f"{chosen.get('label', integrator)} {WITHOUT[need]}", program.name)
+            if need not in chosen["carries"]:
+                warnings.add(f"{chosen['label']} {WITHOUT[need]}", program.name)
 
 
 def export_active_camera(engine, depsgraph, width: int, height: int, warnings: Warnings):

@@ -111,3 +111,16 @@ def parameters_of(scene, descriptor: dict) -> dict:
     values = {name: value_of(scene, name) if name in SHARED else getattr(own, name) for name in names}
     # Switches are numbers to the native side.
     return {name: int(value) if isinstance(value, bool) else value for name, value in values.items()}
+
+
+def unheeded(scene, descriptor: dict) -> list[str]:
+    """What of the scene's settings shows in the picture all the same, since the integrator has no such switch."""
+    names = [p["name"] for p in descriptor["parameters"]]
+    if "diffuse_bounces" not in names:  # there are no caustics
+        return []
+    switches = {"caustics_reflective": "of mirrors and gloss", "caustics_refractive": "of glass"}
+    return [
+        f"{descriptor['label']} shows caustics {which}, which the scene has switched off"
+        for name, which in switches.items()
+        if name not in names and not value_of(scene, name)
+    ]

@@ -38,6 +38,19 @@ def test_integrators_say_what_they_do_not_carry(skin):
     assert '"Skin"' in warning
 
 
+def test_integrators_say_which_caustics_they_cannot_switch_off(skin):
+    def told(integrator):
+        return [text for text in exported(integrator).warnings if "caustics" in text]
+
+    assert not told("bdpt")
+    bpy.context.scene.cycles.caustics_refractive = False
+    bpy.context.scene.update_tag()
+    (text,) = told("bdpt")
+    assert "of glass" in text
+    assert not told("path")  # switches them off
+    assert not told("whitted")  # has none
+
+
 def test_approximated_nodes_are_counted(skin):
     tree = skin.node_tree
     hair = tree.nodes.new("ShaderNodeBsdfRayPortal")
