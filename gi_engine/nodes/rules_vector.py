@@ -95,6 +95,14 @@ def normal_map(b):
     b.output("Normal", result)
 
 
+@rule("ShaderNodeRadialTiling")
+def radial_tiling(b):
+    inputs = [b.input(name) for name in ("Vector", "Sides", "Roundness")]
+    made = b.op("radial_tiling", *inputs, imm=(b.node.normalize,))
+    for name, value in zip(("Coordinates", "ID", "Width", "Rotation"), made, strict=True):
+        b.output(f"Segment {name}", value)
+
+
 @rule("ShaderNodeBump")
 def bump(b):
     normal = b.linked_or("Normal", b.op("normal"))

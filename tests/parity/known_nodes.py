@@ -1,8 +1,6 @@
 """Nodes that give other values than in Cycles, and why: rows of docs/parity-nodes.md that are known to fail."""
 
-KNOWN: dict[str, str] = {
-    "ShaderNodeRadialTiling": "not made",
-}
+KNOWN: dict[str, str] = {}
 # In one of Blender's versions, or by a pixel more or less than is allowed.
 SOMETIMES: dict[str, str] = {
     "ShaderNodeTexIES": "up to Blender 4.5 vectors that are not unit count as they are",

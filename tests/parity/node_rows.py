@@ -21,6 +21,7 @@ SPAN = 1.625  # jumps of a value then do not lie on the centres of pixels; exact
 SLANT = 1.0625  # of every other input, so that two of them are not the same along a diagonal
 FINE = 0.2  # patterns so much coarser than by default, or pixels would be too few for them
 POSITIVE = {"Exponent", "Randomness"}  # at 0 all points are as far, and the nearest is anyone's
+LEAST = {"Sides": 2.0625}  # two sides with round corners are not a number in Cycles
 LAYOUT = {"NodeFrame", "NodeReroute", "NodeGroupInput", "NodeGroupOutput", "ShaderNodeGroup"}
 
 
@@ -245,6 +246,7 @@ def move(tree, socket, i: int, given: dict) -> None:
         start = 0.0 if factor else default - 0.5 * size
         if socket.name in POSITIVE:
             size, start = 0.75, 0.1875
+        start = max(start, LEAST.get(socket.name, start))
         put(
             tree,
             socket,

@@ -2,6 +2,7 @@
 #include "shading/op_helpers.h"
 #include "shading/ops.h"
 #include "shading/tables.h"
+#include "shading/textures/radial_tiling.h"
 
 namespace gi {
 namespace {
@@ -124,6 +125,15 @@ void curves(const Operands& o, ShadeState& s) {
 }
 
 constexpr OpKind kPure = OpKind::kPure;
+// -> (along, outwards, 0), segment, width, rotation; vector, sides, roundness; normalized
+void radial_tiling(const Operands& o, ShadeState&) {
+  const Vec3 p = o.v(4);
+  const float sides = std::max(o.f(5), 2.0f);
+  const texture::RadialTiling t = texture::RadialPolygon(sides, clamp01(o.f(6))).at(p.x, p.y, o.imm(7) != 0);
+  o.set(0, Vec3{t.along, t.outwards, 0.0f}), o.set(1, texture::radial_segment(p.x, p.y, sides));
+  o.set(2, t.width), o.set(3, t.rotation);
+}
+
 const Op kOps[] = {
     {"vector_add", "v", "vv", 0, kPure, vector_op2<[](Vec3 a, Vec3 b) { return a + b; }>},
     {"vector_subtract", "v", "vv", 0, kPure, vector_op2<[](Vec3 a, Vec3 b) { return a - b; }>},
@@ -159,6 +169,7 @@ const Op kOps[] = {
     {"mapping", "v", "vvvvvv", 1, kPure, mapping},
     {"rotate_rows", "v", "vvvvv", 1, kPure, rotate_rows},
     {"rotate_axis", "v", "vvvf", 0, kPure, rotate_axis},
+    {"radial_tiling", "vfff", "vff", 1, kPure, radial_tiling},
     {"map_range_vector", "v", "vvvvvv", 2, kPure, map_range_vector},
     {"saturate_vector", "v", "v", 0, kPure, component_op1<[](float a) { return clamp01(a); }>},
     {"mix_vector", "v", "fvv", 0, kPure, mix_vector},
