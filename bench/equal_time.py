@@ -33,7 +33,7 @@ WAYS = {
     "light": ("GI_ENGINE", "light"),
     "irradiance_cache": ("GI_ENGINE", "irradiance_cache"),
     "photon_map": ("GI_ENGINE", "photon_map"),
-    "photon_map_cached": ("GI_ENGINE", "photon_map", {"global_light": "CACHED"}),
+    "photon_map_gathered": ("GI_ENGINE", "photon_map", {"global_light": "GATHERED"}),
     "sppm": ("GI_ENGINE", "sppm"),
     "vcm": ("GI_ENGINE", "vcm"),
     "cycles": ("CYCLES", ""),

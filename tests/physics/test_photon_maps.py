@@ -115,3 +115,37 @@ def test_the_caustic_of_a_lens_is_that_of_light_tracing():
         found, own = rings(way, 8, **parameters)
         assert truth.max() > 5 * np.median(truth)
         np.testing.assert_array_less(np.abs(found - truth), 5 * np.hypot(error, own) + 0.03 * truth)
+
+
+def test_a_still_caustic_does_not_flicker():
+    """A camera that moves by whole pixels from frame to frame sees the same photons at the same places, whatever the seed."""
+    pixels, width, step, frames = 24, 1.2, 2, 4
+    floor = quad((-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1))
+    light = lamp("SPOT", (30.0,) * 3, matrix=matrix((0, 0, 3)), radius=0.0, spot_size=0.35, spot_blend=0.1)
+    scene = scene_of((floor, surface(0.8)), (sphere(0.4, 64), glass(1.5)), lights=[light])
+
+    def flicker(keeps):
+        kept, places = None, []
+        half = width / 2
+        for frame in range(frames):
+            x = frame * step * width / pixels
+            scene.camera = sd.Camera(
+                "camera", "ORTHO", looking((x, 0, -0.7), (0, 0, -1)), (-half, half, -half, half), 0.0, 1e6
+            )
+            scene.film = sd.Film(pixels, pixels, filter="BOX", filter_width=1.0, passes=["Combined", "Caustic"])
+            parameters = {**BOUNCES, "caustic_photons": 20_000, "global_photons": 100}
+            settings = sd.Settings("photon_map", 64, seed=frame, threads=2, parameters=parameters)
+            with Session(scene, settings, kept=kept, steady=kept is not None) as session:
+                while not session.wait():
+                    pass
+                image = session.read("Caustic")[..., 0].astype(np.float64)
+                kept = session.native.kept() if keeps else None
+            seen = pixels - step * (frames - 1)
+            first = step * (frames - 1 - frame)
+            places.append(image[:, first:][:, :seen])
+        bright = np.mean(places, 0) > 0.2 * np.max(places)
+        return (np.var(places, 0, ddof=1) / np.mean(places, 0) ** 2)[bright].mean()
+
+    alone, kept = flicker(False), flicker(True)
+    assert alone > 1e-4
+    assert kept < 0.05 * alone, f"{kept:.2e}, without {alone:.2e}"

@@ -378,9 +378,8 @@ const Descriptor& photon_map_descriptor() {
   static const Descriptor descriptor{
       "photon_map",
       "Photon Mapping",
-      "Photons are sent out and stored once; the picture reads caustics from them and gathers all other indirect light. Free of most "
-      "noise, "
-      "blurred by the photons' distance",
+      "Photons are sent out and stored once; the picture reads caustics from them and gathers all other indirect light, at few places "
+      "unless told otherwise. Free of most noise, blurred by the photons' distance",
       {
           {"global_photons", "Global Photons", Kind::kInt, 200000, 1, 1e9, "Sent out for light that diffuse surfaces throw on each other"},
           {"caustic_photons", "Caustic Photons", Kind::kInt, 1000000, 1, 1e9, "Sent out for what mirrors, glass and glossy surfaces throw"},
@@ -394,7 +393,7 @@ const Descriptor& photon_map_descriptor() {
           {"global_light",
            "Global Light",
            Kind::kChoice,
-           0,
+           1,
            0,
            3,
            "How light that diffuse surfaces throw on each other is found",
