@@ -10,6 +10,7 @@ import pytest
 from gi_engine import cli, content, kept_file
 from gi_engine import scene_data as sd
 
+VERSION = 3  # of the tables of irradiance records
 HERE = ("--integrator", "irradiance_cache", "--set", "record_samples=64", "--resolution", "32x32")
 
 
@@ -54,7 +55,7 @@ def test_a_cache_is_kept_and_taken_over(gi, room, tmp_path):
     first = gi("render", file, "-o", out, "--cache", cache, *HERE)
     assert (first.code, first.err) == (cli.DONE, "")
     picture = combined(out)
-    kept = kept_file.read(cache, "irradiance_cache", 2)
+    kept = kept_file.read(cache, "irradiance_cache", VERSION)
     assert sum(len(t) for name, t in kept.tables.items() if name != "bounds") == records(first)
     again = gi("render", file, "-o", out, "--cache", cache, *HERE)
     assert (again.code, again.err) == (cli.DONE, "")
@@ -64,9 +65,9 @@ def test_a_cache_is_kept_and_taken_over(gi, room, tmp_path):
     still = ("--set", "refinement=0")
     assert records(gi("render", file, "-o", out, "--cache", cache, *HERE, *still)) == records(again)
     assert cache.read_bytes() == bytes_before  # nothing was added
-    before = kept_file.read(cache, "irradiance_cache", 2).tables["bounce 1"]
+    before = kept_file.read(cache, "irradiance_cache", VERSION).tables["bounce 1"]
     assert records(gi("render", file, "-o", out, "--cache", cache, *HERE)) == records(again)
-    after = kept_file.read(cache, "irradiance_cache", 2).tables["bounce 1"]
+    after = kept_file.read(cache, "irradiance_cache", VERSION).tables["bounce 1"]
     assert (after[:, -1] >= before[:, -1]).all()  # rays of each record, in portions
     assert after[:, -1].sum() > before[:, -1].sum()
     assert sorted(p.name for p in tmp_path.iterdir() if "blend" not in p.name) == ["light.cache", "out.exr"]

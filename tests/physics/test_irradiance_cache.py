@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from agreement_scenes import SCENES, camera
 from light_scenes import f32, lamp, matrix, triangle_scene
-from test_closed_forms import cube, lambert, probe, quad, scene_of, sphere, surface
+from test_closed_forms import cube, lambert, probe, quad, scene_of, shiny, sphere, surface
 
 from gi_engine import native
 from gi_engine import scene_data as sd
@@ -274,6 +274,26 @@ def test_blotches_fade_as_records_are_refined():
 
     once, refined = between_seeds(0.0), between_seeds(0.5)
     assert refined < 0.25 * once, (refined, once)
+
+
+def test_caustics_leave_grain_and_no_spots():
+    """What a mirror ball throws of a small lamp on a wall: the same light, whether records know all of it or what is not too bright."""
+
+    def wall(seed, integrator="irradiance_cache", samples=64, **parameters):
+        light = lamp("AREA", (200.0,) * 3, matrix=matrix((0.3, 0.2, 0.7)), size=(0.1, 0.1))
+        scene = scene_of((cube(), surface(0.5)), (sphere(0.3), shiny(0.0)), lights=[light])
+        scene.camera = sd.Camera("camera", "ORTHO", matrix((0, 0, -0.5)), (-0.9, 0.9, -0.9, 0.9), 0.0, 100.0)
+        (image,), _ = render(scene, seed, samples=samples, integrator=integrator, **parameters)
+        return image[..., 0]
+
+    truth = np.mean([wall(seed, "bdpt", 512) for seed in (8, 9)], 0)
+    spots = {}
+    for limit in (10.0, 1e9):
+        found = np.array([wall(seed, cached_caustics=limit, refinement=0) for seed in range(1, 9)])
+        means = found.mean((1, 2))
+        assert abs(means.mean() - truth.mean()) < 4 * means.std(ddof=1) / math.sqrt(len(means)) + 0.01 * truth.mean()
+        spots[limit] = np.mean(found > 1.25 * truth)
+    assert spots[10.0] < 0.5 * spots[1e9], spots
 
 
 def test_cancel_ends_the_overture():

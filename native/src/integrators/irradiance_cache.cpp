@@ -10,11 +10,17 @@ namespace {
 constexpr LightSampling kMode = LightSampling::kMis;
 
 // A path under way. What it finds of luminaires and what of anything else may count differently: luminaires are sampled at every
-// surface, also where all other light came from the cache.
+// surface, also where all other light came from the cache. Of luminaires that it finds by way of mirrors and clear glass, the cache
+// has what does not exceed a limit: the rest, which would leave bright spots around records, counts where it is found.
 struct Walk {
   CameraPath path;            // its throughput is for all but luminaires
   Rgb to_luminaires{1.0f};
+  Rgb to_excess{};            // of that rest; negative: leaves it out
+  Rgb mirrors{1.0f};          // throughput of the mirrors since the last other surface
+  bool by_mirror = false;     // there are some
   float first_distance = kInf;
+
+  bool is_over() const { return is_black(to_luminaires) && is_black(to_excess); }
 };
 
 class IrradianceCacheIntegrator final : public Integrator {
@@ -26,6 +32,7 @@ class IrradianceCacheIntegrator final : public Integrator {
         clamp_indirect_(p.real("clamp_indirect")),
         no_caustics_(no_caustics(p)),
         filter_glossy_(p.real("filter_glossy")),
+        cached_caustics_(p.real("cached_caustics")),
         records_({p.real("error"),
                   p.integer("record_samples"),
                   p.integer("cached_bounces"),
@@ -35,7 +42,8 @@ class IrradianceCacheIntegrator final : public Integrator {
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     records_.before_pass(context, film, pass, [&](const CameraRay& from, const PathState& state, Sampler& sampler) -> GatheredRay {
-      Walk walk{CameraPath(from), Rgb()};  // luminaires are sampled where the record is used
+      // Luminaires are sampled where the record is used. Of deeper records many are averaged: bright spots do no harm there.
+      Walk walk{CameraPath(from), Rgb(), records_.level_of(state) == 1 ? Rgb(-1.0f) : Rgb()};
       walk.path.state = state;
       walk.path.state.without = no_caustics_;
       walk.path.seen_from_camera = false;
@@ -62,6 +70,7 @@ class IrradianceCacheIntegrator final : public Integrator {
   float clamp_direct_, clamp_indirect_;
   uint8_t no_caustics_;  // CausticFlags of what is left out
   float filter_glossy_;
+  float cached_caustics_;  // radiance
   IrradianceRecords records_;
 };
 
@@ -76,22 +85,28 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     result.radiance += clamp_contribution(throughput * radiance, depth > 1 ? clamp_indirect_ : clamp_direct_);
   };
 
+  const auto add_luminaire = [&](Rgb radiance, int depth) {
+    add(walk.to_luminaires, radiance, depth);
+    if (walk.by_mirror) add(walk.to_excess, positive(walk.mirrors * radiance - Rgb(cached_caustics_)), depth);
+  };
+
   for (uint32_t bounce = 0;; ++bounce) {
     sampler.jump_to(bounce + 1);
     const uint32_t visibility = visibility_of(path.state.kind);
     const int depth = path.state.depth;
     const auto hit = context.scene.intersect(path.ray, visibility);
-    add(walk.to_luminaires, lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, kMode, visibility), depth);
+    add_luminaire(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, kMode, visibility), depth);
     if (!hit) {
-      if (!path.seen_from_camera && is_black(walk.to_luminaires)) break;
-      add(walk.to_luminaires, path.leave(context, film, kMode, result), depth);
+      if (path.seen_from_camera || !walk.is_over()) add_luminaire(path.leave(context, film, kMode, result), depth);
       break;
     }
     if (bounce == 0) walk.first_distance = hit->t;
+    const bool may_mirror = context.scene.material(context.scene.material_of(hit->instance, hit->triangle)).program.may_mirror();
     if (!may_scatter || is_black(path.throughput)) {
-      if (is_black(walk.to_luminaires)) break;
-      if (const auto emitted = path.end(context, camera, *hit, kMode)) {
-        add(walk.to_luminaires, *emitted, depth);
+      if (walk.is_over()) break;
+      const bool goes_on = may_scatter && may_mirror && !is_black(walk.to_excess);
+      if (const auto emitted = goes_on ? std::nullopt : path.end(context, camera, *hit, kMode)) {
+        add_luminaire(*emitted, depth);
         break;
       }
     }
@@ -100,7 +115,7 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
 
     const Rgb emitted = surface_emission(context, point, bsdf.emission, path.origin, kMode);
     if (depth == 0) result.emission += path.throughput * emitted;
-    add(walk.to_luminaires, emitted, depth);
+    add_luminaire(emitted, depth);
 
     // Luminaires are sampled here; other light of the diffuse lobes is looked up.
     const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
@@ -123,7 +138,7 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     path.travelled += hit->t;
     if (transparent) {
       const Rgb weight = next->value / next->pdf_dir;
-      path.throughput *= weight, walk.to_luminaires *= weight;
+      path.throughput *= weight, walk.to_luminaires *= weight, walk.to_excess *= weight;
       if (!advance(path.state, next->flags, limits_)) break;
       path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, path.ray.t_max - hit->t};
       path.origin.query.path = path.state;
@@ -132,11 +147,20 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
 
     // Follow it: to luminaires by all lobes, to all else by those that are not in the cache.
     const bool delta = next->flags & kSpecular;
-    Rgb rest = next->value;
-    if (is_cached && !delta) rest = positive(rest - bsdf.eval(point.wo, next->wi, kReflection | kTransmission | kDiffuse).value);
-    walk.to_luminaires = path.throughput * next->value / next->pdf_dir;
-    path.throughput *= rest / next->pdf_dir;
-    if (is_black(walk.to_luminaires)) break;
+    const Rgb weight = next->value / next->pdf_dir;
+    walk.to_luminaires = path.throughput * weight;
+    if (delta) {
+      walk.mirrors *= weight;
+      walk.to_excess = may_mirror ? walk.to_excess : Rgb();
+      path.throughput *= weight;
+    } else {
+      const Rgb known = is_cached ? bsdf.eval(point.wo, next->wi, kReflection | kTransmission | kDiffuse).value / next->pdf_dir : Rgb();
+      walk.mirrors = Rgb(1.0f);
+      walk.to_excess = records_.level_of(point.path) == 0 ? path.throughput * known : Rgb();
+      path.throughput *= positive(weight - known);
+    }
+    walk.by_mirror = delta;
+    if (walk.is_over()) break;
     may_scatter = advance(path.state, next->flags, limits_);
     const FilmSpec& spec = film.spec();
     if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
@@ -147,8 +171,11 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
 
     // Russian roulette for all but luminaires, which the next ray meets anyway.
-    const float alpha = std::min(1.0f, std::sqrt(max_component(path.throughput)));
-    if (alpha < 1.0f) path.throughput = sampler.next_1d() < alpha ? path.throughput / alpha : Rgb();
+    const float alpha = std::min(1.0f, std::sqrt(max_component(max(path.throughput, abs(walk.to_excess)))));
+    if (alpha < 1.0f) {
+      const float kept = sampler.next_1d() < alpha ? 1.0f / alpha : 0.0f;
+      path.throughput *= kept, walk.to_excess *= kept;
+    }
   }
 }
 
@@ -169,6 +196,8 @@ const Descriptor& irradiance_cache_descriptor() {
            "Share of the passes' time in which records get more rays: blotches fade as noise does. 0 leaves them as they were first"},
           {"cached_bounces", "Cached Bounces", Kind::kInt, 4, 1, IrradianceRecords::kMostLevels,
            "Diffuse bounces that have records; further ones are path traced"},
+          {"cached_caustics", "Cached Caustics", Kind::kFloat, 10, 0, 1e9,
+           "Radiance up to which what mirrors and glass throw is cached; what exceeds it is path traced: grain instead of bright spots"},
           {"min_spacing", "Minimum Spacing", Kind::kFloat, 1.5, 0, 1e4, "Pixels for which a record holds at least"},
           {"max_spacing", "Maximum Spacing", Kind::kFloat, 40, 1, 1e6, "Pixels for which a record holds at most"},
           {"min_length", "Minimum Distance", Kind::kFloat, 0, 0, 1e6, "The same as a length", "LENGTH"},
@@ -189,7 +218,7 @@ const Descriptor& irradiance_cache_descriptor() {
       },
       [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<IrradianceCacheIntegrator>(p); },
       /*bakes=*/false,
-      /*kept_version=*/2,
+      /*kept_version=*/3,
       /*kept_by_place=*/true};
   return descriptor;
 }

@@ -217,9 +217,9 @@ const Op kOps[] = {
     // coat, roughness, ior, tint
     {"coat_layer", "v", "vvfffv", 0, OpKind::kClosure, layer<coat_layer>, kAddsLobe | kSeesPoint},
     // metallic, color, tint, roughness, anisotropic, rotation, tangent, film thickness, film ior; distribution
-    {"metal_layer", "v", "vvfvvfffvff", 1, OpKind::kClosure, layer<metal_layer>, kAddsLobe | kSeesPoint},
+    {"metal_layer", "v", "vvfvvfffvff", 1, OpKind::kClosure, layer<metal_layer>, kAddsLobe | kSeesPoint | kMayMirror},
     // transmission, color, tint, roughness, ior, thin, film thickness, film ior; distribution
-    {"glass_layer", "v", "vvfvvfffff", 1, OpKind::kClosure, layer<glass_layer>, kAddsLobe | kSeesPoint},
+    {"glass_layer", "v", "vvfvvfffff", 1, OpKind::kClosure, layer<glass_layer>, kAddsLobe | kSeesPoint | kMayMirror},
     // roughness, ior, level, tint, anisotropic, rotation, tangent, film thickness, film ior; distribution
     {"specular_layer", "v", "vvfffvffvff", 1, OpKind::kClosure, layer<specular_layer>, kAddsLobe | kSeesPoint},
     // color, roughness, subsurface, its anisotropy, thin, radius, scale, surface roughness, ior, level, ior of skin; method

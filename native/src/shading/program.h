@@ -61,7 +61,7 @@ enum class OpKind : uint8_t {
   kRestore,
 };
 // What a closure op adds, for the programs specialised to one question, and whether it looks at the point to do so.
-enum ClosureEffect : uint8_t { kAddsLobe = 1, kAddsEmission = 2, kAddsTransparency = 4, kSeesPoint = 8, kAddsAov = 16 };
+enum ClosureEffect : uint8_t { kAddsLobe = 1, kAddsEmission = 2, kAddsTransparency = 4, kSeesPoint = 8, kAddsAov = 16, kMayMirror = 32 };
 
 struct Op {
   const char* name;
@@ -101,6 +101,7 @@ class Program {
   const std::string& name() const { return name_; }
   bool has_transparency() const { return effects_ & kAddsTransparency; }
   bool has_emission() const { return effects_ & kAddsEmission; }
+  bool may_mirror() const { return effects_ & kMayMirror; }  // whether a lobe of it may be perfectly smooth
   // Whether its lobes may depend on where the surface is seen from, or on how it came to be seen.
   bool sees_view() const { return sees_view_; }
   bool empty() const { return code_.empty(); }

@@ -37,6 +37,12 @@ class IrradianceRecords {
   // What diffuse lobes scatter of light from other surfaces; nothing where records do not know it for all of them.
   std::optional<Rgb> read(const ShadingPoint& point, const Bsdf& bsdf, PixelSample& result) const;
 
+  // Diffuse bounces that a path may still make, and how many of all it has made: its level.
+  int most_bounces() const { return std::min(s_.limits.diffuse, s_.limits.total); }
+  int level_of(const PathState& state) const {
+    return most_bounces() - std::min(s_.limits.diffuse - state.diffuse_depth, s_.limits.total - state.depth);
+  }
+
   size_t size() const;
   void take_over(const Kept& kept);  // before the first pass
   Kept keep() const;
@@ -58,11 +64,6 @@ class IrradianceRecords {
   GatheredIrradiance gather(const Work& work, const IrradiancePlace& place, int level, uint32_t serial) const;
   bool is_late(const RenderContext& context) const { return context.time_limit > 0.0 && context.seconds() > level_ends_; }
 
-  // Diffuse bounces that a path may still make, and how many of all it has made: its level.
-  int most_bounces() const { return std::min(s_.limits.diffuse, s_.limits.total); }
-  int level_of(const PathState& state) const {
-    return most_bounces() - std::min(s_.limits.diffuse - state.diffuse_depth, s_.limits.total - state.depth);
-  }
   int level_count() const { return std::min(s_.levels, most_bounces()); }
   // Deeper records are seen through shallower ones: they may be coarser.
   float error_at(int level) const { return level == 0 ? s_.error : std::min(2.0f * s_.error, 0.6f); }
