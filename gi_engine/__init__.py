@@ -2,14 +2,14 @@
 
 
 def register() -> None:
-    from . import engine, headless, properties, ui
+    from . import engine, headless, preferences, properties, ui
 
-    for part in (properties, engine, ui, headless):
+    for part in (preferences, properties, engine, ui, headless):
         part.register()
 
 
 def unregister() -> None:
-    from . import engine, headless, properties, ui
+    from . import engine, headless, preferences, properties, ui
 
-    for part in (headless, ui, engine, properties):
+    for part in (headless, ui, engine, properties, preferences):
         part.unregister()

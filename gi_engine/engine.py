@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import control, native, viewport
+from . import caches, control, log, native, viewport
 from .bake import BakeError, bake_for_blender, blender_folders
 from .denoise import denoise
 from .display import duration
@@ -62,7 +62,9 @@ class GIEngine(bpy.types.RenderEngine):
         try:
             self.update_stats("", "Exporting")
             control.report(control.Progress(stage="Export"))
+            started = time.monotonic()
             self.exported = self.export(depsgraph)
+            log.logger.debug("exported in %.2f s", time.monotonic() - started)
         except Exception as error:  # told in render(), which must run: a result that is never begun crashes Blender
             self.failure = error
 
@@ -117,11 +119,13 @@ class GIEngine(bpy.types.RenderEngine):
             )
         self.update_stats("", "Building the scene")
         control.report(control.Progress(stage="Build"))
+        started = time.monotonic()
         keeping = self.keeping(depsgraph) if keeps(settings) and not self.is_preview else None
         tables = keeping.tables if keeping else None
         path = (control.current.path if control.current else _path) if keeping and tables is None else ()
         with Session(scene, settings, kept=tables, path=path, steady=bool(keeping and keeping.steady)) as session:
             self.exported.scene = None  # the native side has taken what it needs
+            log.logger.debug("%s; built in %.2f s", session.native_scene.embree, time.monotonic() - started)
             for message in session.warnings():
                 self.warn(message)
             self.stream(session, result)
@@ -132,7 +136,7 @@ class GIEngine(bpy.types.RenderEngine):
         """What this render takes over."""
         settings, scene, layer = self.exported.settings, depsgraph.scene, depsgraph.view_layer.name
         memory = control.current.kept if control.current else _kept
-        path = Path(bpy.path.abspath(settings.kept_file)) if settings.kept_file else None
+        path = kept_path(settings.kept_file)
         if path and sum(view_layer.use for view_layer in scene.view_layers) > 1:
             path = path.with_stem(f"{path.stem}-{bpy.path.clean_name(layer)}")
         keeping = Keeping(
@@ -145,6 +149,9 @@ class GIEngine(bpy.types.RenderEngine):
     def hand_on(self, keeping: Keeping, session: Session) -> None:
         try:
             keeping.hand_on(session.native.kept())
+            if keeping.path:
+                caches.mark_used(keeping.path)
+                caches.trim()
         except KeptFileError as error:
             self.warn(str(error))
         for message in keeping.messages:
@@ -164,6 +171,10 @@ class GIEngine(bpy.types.RenderEngine):
             self.tell(session.progress())
         self.show(session, result)
         progress = session.progress()
+        log.logger.info(
+            "%s: %s, %s threads: %s", result.layers[0].name, self.exported.settings.integrator,
+            self.exported.settings.threads or "all", status_words(progress),
+        )  # fmt: skip
         if self.exported.settings.denoising and progress["passes"] and not self.is_preview:
             self.denoise(session, result)
         self.next_status = 0.0
@@ -280,6 +291,13 @@ class GIEngine(bpy.types.RenderEngine):
             self.register_pass(scene, renderlayer, p.blender_name, len(p.channels), p.channels, p.kind)
 
 
+def kept_path(text: str) -> Path | None:
+    """Of the scene's Cache File: what is named without a folder lies in the preferences' one."""
+    if not text:
+        return None
+    return caches.light_file(text) if Path(text).name == text else Path(bpy.path.abspath(text))
+
+
 def fill(blender_pass, pixels: np.ndarray) -> None:
     blender_pass.rect.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
 
@@ -312,6 +330,14 @@ def status(progress: dict, left: float | None, samples: int) -> str:
     if left is not None:
         parts.insert(0, f"Remaining {duration(left)}")
     return " | ".join(parts)
+
+
+def status_words(progress: dict) -> str:
+    """Of a render that has ended, for the log."""
+    rate = progress["rays"] / progress["seconds"] * 1e-6 if progress["seconds"] > 0 else 0
+    ended = "stopped after" if progress["cancelled"] else "done:"
+    memory = progress["memory"] / 2**20
+    return f"{ended} {progress['passes']} samples, {progress['seconds']:.2f} s, {rate:.1f} Mrays/s, {memory:.0f} MB"
 
 
 def look_ahead(cameras: list) -> None:

@@ -86,7 +86,7 @@ def fixed_properties() -> dict:
         ),
         "kept_file": StringProperty(
             name="Cache File",
-            description="Keeps what was worked out from one render to the next; empty for no file",
+            description="Keeps what was worked out from one render to the next; empty for no file. A name without a folder is one in the cache folder of the add-on's preferences",
             subtype="FILE_PATH",
             options=RELATIVE,
         ),

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import bpy
 
-from .. import native
+from .. import caches, machine, native
 from ..output import OutputError
 from .child import Cancelled, Child, ChildFailed
 from .plan import CYCLES, Plan, PlanError, find_reference, to_json
@@ -42,9 +42,10 @@ class Job:
         except JobError:
             self.leave()
             raise
-        plan = Plan(
-            self.copy, engines, self.work, reference, seconds=settings.seconds, cache=session_folder("references")
-        )
+        plan = Plan(self.copy, engines, self.work, reference, seconds=settings.seconds)
+        # The process has the preferences as they were saved, which need not be those of now.
+        plan.cache = caches.folder(caches.REFERENCES)
+        plan.threads = machine.current.threads if scene.render.threads_mode != "FIXED" else 0
         self.stopping = threading.Event()
         self.thread = threading.Thread(target=self.run, args=(to_json(plan),), daemon=True)
         self.thread.start()
@@ -82,6 +83,7 @@ class Job:
             raise JobError(f'"{error.filename}" cannot be written: {error.strerror}') from error
         finally:
             self.leave()
+            caches.trim()
         return json.loads((self.folder / "report.json").read_text(encoding="utf-8"))
 
     def cancel(self) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -99,17 +97,6 @@ def find_reference(text: str) -> str | Path:
             raise PlanError(f'reference "{text}" is not there')
         return Path(text)
     return find_engine(text)
-
-
-def cache_folder() -> Path:
-    """Where references are kept, by the habits of the system."""
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home())
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "gi-engine" / "references"
 
 
 def content_key(plan: Plan, engine: str, facts: dict) -> str:

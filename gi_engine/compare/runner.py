@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import caches
 from . import metrics, pictures, reference
 from .child import Cancelled, Child, ChildFailed
 from .pictures import PictureError
-from .plan import FIRST_SECONDS, STEP, Plan, cache_folder, content_key, engine_label
+from .plan import FIRST_SECONDS, STEP, Plan, content_key, engine_label
 from .reference import Reference
 
 ENGINE_TIMES = 2.3  # an engine's own time, in all: the shorter renders, and the one by another seed
@@ -112,7 +113,8 @@ class Run:
             else:
                 label = engine_label(wanted)
                 with self.child(wanted) as (child, facts):
-                    folder = (self.plan.cache or cache_folder()) / content_key(self.plan, wanted, facts)
+                    place = self.plan.cache or caches.folder(caches.REFERENCES)
+                    folder = place / content_key(self.plan, wanted, facts)
                     self.result.reference = reference.render(
                         child,
                         self.plan,
@@ -121,6 +123,9 @@ class Run:
                         lambda at, said: self.tell(at, f"reference ({label})", f"{said['samples']} samples"),
                     )
                 self.result.reference.name = label
+                caches.mark_used(folder)
+                if self.plan.cache is None:  # another place is the user's affair
+                    caches.trim()
             pictures.write_exr(self.plan.output / "reference.exr", self.result.reference.pixels)
         except (ChildFailed, PictureError, OSError) as error:
             self.warn(f"no reference: {error}; pictures are shown without figures")

@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .. import control, headless
+from .. import control, headless, machine
 from ..control import Control, RenderError
 from .metrics import BLOCK
 from .service import serve
@@ -105,8 +105,9 @@ def prepare(scene, view: dict) -> None:
     if view["region"]:
         render.use_border = render.use_crop_to_border = True
         render.border_min_x, render.border_min_y, render.border_max_x, render.border_max_y = view["region"]
-    if view["threads"]:
-        render.threads_mode, render.threads = "FIXED", view["threads"]
+    threads = view["threads"] or (machine.current.threads if render.threads_mode != "FIXED" else 0)
+    if threads:  # as many for Cycles
+        render.threads_mode, render.threads = "FIXED", threads
     render.use_compositing = render.use_sequencer = False
     for layer in scene.view_layers:
         layer.samples = 0

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+from .. import machine
 from ..scene_data import Settings
 from .film import export_denoising
 from .ids import MASK, hash_words
@@ -95,7 +96,7 @@ def export_settings(scene, view_layer, descriptors: list[dict], integrator: str 
         time_limit=resolved.time_limit,
         noise_target=own.noise_target,
         seed=resolved.seed,
-        threads=scene.render.threads if scene.render.threads_mode == "FIXED" else 0,
+        threads=scene.render.threads if scene.render.threads_mode == "FIXED" else machine.current.threads,
         parameters=parameters_of(scene, chosen) if chosen else {},
         keep=own.keep,
         kept_file=own.kept_file,

@@ -41,6 +41,10 @@ def package(out: Path, given: list[Path], compiler: str, say) -> list[Path]:
     shutil.copytree(ROOT / "gi_engine", source, ignore=shutil.ignore_patterns(*NOT_SHIPPED))
     compiled = [wheels.tagged(path, source / "wheels", sorted_pythons(path, given)) for path in given]
     platforms = sorted({platform_of(Name.of(path).platform) for path in compiled})
+    for platform, missing in not_served(compiled).items():
+        say(
+            f"{platform}: warning: nothing here is for Python {', '.join(missing)}; Blender refuses to render with it there"
+        )
     for platform in platforms:
         say(f"{platform}: gathering the wheels of others")
         gather(source, work / "fetched", platform)
@@ -57,7 +61,23 @@ def sorted_pythons(path: Path, given: list[Path]) -> list[str]:
         for n in map(Name.of, given)
         if n.abi != "abi3" and platform_of(n.platform) == platform_of(own.platform)
     }
-    return [python for python in PYTHONS if python not in exact] if own.abi == "abi3" else PYTHONS
+    if own.abi != "abi3":
+        return PYTHONS
+    return [python for python in PYTHONS if python not in exact and minor(python) >= minor(own.python)]
+
+
+def minor(python: str) -> int:
+    """cp311 to 11."""
+    return int(python[3:])
+
+
+def not_served(compiled: list[Path]) -> dict[str, list[str]]:
+    """Pythons of Blender's for which a platform has nothing compiled."""
+    served: dict[str, set[str]] = {}
+    for name in map(Name.of, compiled):
+        served.setdefault(platform_of(name.platform), set()).update(name.python.split("."))
+    missing = {platform: [python for python in PYTHONS if python not in has] for platform, has in served.items()}
+    return {platform: pythons for platform, pythons in missing.items() if pythons}
 
 
 def platform_of(tag: str) -> str:

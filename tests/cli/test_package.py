@@ -79,6 +79,16 @@ def test_other_platforms_are_named(tag):
         assemble.platform_of(tag)
 
 
+def test_a_stable_wheel_serves_no_older_python(tmp_path):
+    """What it calls is not there; Blender would install it and fail to render."""
+    of = lambda python, abi: tmp_path / str(Name("gi_engine_native", "0.1.0", python, abi, "linux_x86_64"))  # noqa: E731
+    stable, exact = of("cp312", "abi3"), of("cp311", "cp311")
+    assert assemble.sorted_pythons(stable, [stable]) == ["cp313", "cp314"]
+    assert assemble.sorted_pythons(stable, [stable, exact]) == ["cp313", "cp314"]
+    assert assemble.not_served([of("cp313.cp314", "none")]) == {"linux-x64": ["cp311"]}
+    assert assemble.not_served([of("cp313.cp314", "none"), exact]) == {}
+
+
 def test_wrong_wheels_are_named(tmp_path):
     with pytest.raises(WheelError, match="nonsense"):
         Name.of(tmp_path / "nonsense.whl")

@@ -23,7 +23,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^">]+)[">]', re.M)
 
 # What may import bpy (or Blender's other modules): the border with Blender.
 MAY_USE_BLENDER = {
-    "__init__", "engine", "session", "sync", "properties", "bake", "strategies", "viewport", "headless", "info", "passes", "operators", "previews",
+    "__init__", "engine", "session", "sync", "preferences", "properties", "bake", "strategies", "viewport", "headless", "info", "passes", "operators", "previews",
 }  # fmt: skip
 MAY_USE_BLENDER_FOLDERS = {"export", "ui", "compare"}
 BLENDER = {"bpy", "bpy_extras", "bl_ui", "bl_math", "gpu", "gpu_extras", "mathutils", "idprop", "nodeitems_utils"}
