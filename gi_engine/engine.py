@@ -30,6 +30,7 @@ SHOW_SECONDS, SHOW_SECONDS_LATER = 0.25, 3.0
 USER_ERRORS = (BakeError, ExportError, KeepingError, RenderFailed, native.NativeMissing)
 
 LEAVE_SECONDS = 10.0  # that a render has to stop when the add-on is switched off
+SWITCHED_OFF = "the add-on is switched off"
 
 # Said once in an animation, not once a frame.
 _reported: set[str] = set()
@@ -59,7 +60,10 @@ class GIEngine(bpy.types.RenderEngine):
     def update(self, data=None, depsgraph=None):
         # Blender holds still here (under its draw lock), so here is where the scene is read.
         self.exported, self.failure = None, None
+        _running.append("export")
         try:
+            if _leaving.is_set():  # the settings may be gone already
+                raise RenderFailed(SWITCHED_OFF)
             self.update_stats("", "Exporting")
             control.report(control.Progress(stage="Export"))
             started = time.monotonic()
@@ -67,6 +71,8 @@ class GIEngine(bpy.types.RenderEngine):
             log.logger.debug("exported in %.2f s", time.monotonic() - started)
         except Exception as error:  # told in render(), which must run: a result that is never begun crashes Blender
             self.failure = error
+        finally:
+            _running.pop()
 
     def export(self, depsgraph) -> Exported:
         overrides = control.current.overrides if control.current else {}
@@ -161,6 +167,8 @@ class GIEngine(bpy.types.RenderEngine):
         """Shows the image as it grows until it is done or the user has had enough."""
         started = shown = time.monotonic()
         while not session.wait():
+            if _leaving.is_set():  # no picture, or an animation would write it and go on
+                raise RenderFailed(SWITCHED_OFF)
             if self.stopped():
                 session.native.cancel()
                 break
@@ -355,21 +363,36 @@ def forget(*_):
 HANDLERS = (bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel, bpy.app.handlers.load_post)
 
 
+def in_use() -> bool:
+    """Blender may be about to call us or to let go of what it has called."""
+    return bool(_running) or (WINDOW and bpy.app.is_job_running("RENDER"))
+
+
 def stop_renders() -> None:
-    """Ends the renders that are running, and waits until Blender has taken them back."""
-    if not _running:
+    """Ends the renders that are running, and waits until they have returned to Blender."""
+    if not in_use():
         return
     _leaving.set()
     end = time.monotonic() + LEAVE_SECONDS
     while _running and time.monotonic() < end:
         time.sleep(0.05)
-    time.sleep(0.2)  # from the end of render() until Blender lets go of the engine
+
+
+def let_go() -> float | None:
+    """Takes the class away once Blender's render job, which only the main loop can end, is over. A timer."""
+    if in_use():
+        return 0.05
+    bpy.utils.unregister_class(GIEngine)
+    return None
 
 
 def register() -> None:
     _leaving.clear()
     viewport.register()
-    bpy.utils.register_class(GIEngine)
+    if bpy.app.timers.is_registered(let_go):  # switched off and on during a render: it is there yet
+        bpy.app.timers.unregister(let_go)
+    else:
+        bpy.utils.register_class(GIEngine)
     for handlers in HANDLERS:
         handlers.append(forget)
 
@@ -379,4 +402,8 @@ def unregister() -> None:
     viewport.unregister()
     for handlers in HANDLERS:
         handlers.remove(forget)
-    bpy.utils.unregister_class(GIEngine)
+    forget()
+    if in_use():
+        bpy.app.timers.register(let_go, persistent=True)
+    else:
+        bpy.utils.unregister_class(GIEngine)

@@ -1,34 +1,15 @@
 """Inside Blender with a window: F12 ends by itself and makes a picture, Esc ends what would take for ever, with every integrator; so do the
 buttons that bake, render strategies and compare. Real keys, by xdotool. Quits with exit status 0, or 1 after the first thing that went wrong."""
 
-import os
-import subprocess
 import sys
 import tempfile
 import time
-import traceback
 from pathlib import Path
 
 import bpy
 
-F12, ESCAPE = "96", "Escape"  # by key code: xdotool's own F12 comes with a wrong Alt
-
-
-def press(code):
-    subprocess.run(["xdotool", "mousemove", "400", "400", "sleep", "0.2", "key", code], check=True)
-
-
-def renders():
-    return bpy.app.is_job_running("RENDER")
-
-
-def until(test, seconds, what):
-    end = time.monotonic() + seconds
-    while not test():
-        if time.monotonic() > end:
-            raise TimeoutError(f"{what}: waited {seconds} s")
-        yield 0.05
-
+sys.path.insert(0, str(Path(__file__).parent))
+from hands import ESCAPE, F12, in_window, press, renders, run, until  # noqa: E402
 
 ended = []  # how each render did, in the order of their ends
 
@@ -48,13 +29,6 @@ def both_keys(own, chosen):
     yield from until(lambda: len(ended) == 2 and not renders(), 20, f"{chosen}, Esc")
     print(f"window: {chosen}: {ended[0]}, {ended[1]} within {time.monotonic() - start:.1f} s", flush=True)
     assert ended == ["done", "stopped"], (chosen, ended)
-
-
-def in_window():
-    window = bpy.context.window_manager.windows[0]
-    area = max(window.screen.areas, key=lambda a: a.width * a.height)
-    region = next(r for r in area.regions if r.type == "WINDOW")
-    return bpy.context.temp_override(window=window, area=area, region=region)
 
 
 def button(own, name, how, samples, **options):
@@ -149,20 +123,4 @@ def story():
     yield from both_keys(scene.gi_engine, "path")
 
 
-steps = story()
-
-
-def step():
-    try:
-        return next(steps)
-    except StopIteration:
-        code = 0
-    except Exception:
-        traceback.print_exc()
-        code = 1
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)
-
-
-bpy.app.timers.register(step, first_interval=1.0, persistent=True)
+run(story())
