@@ -358,7 +358,7 @@ def test_rendering_leaves_pythons_other_threads_running(plane, watched):
 
 
 def test_switching_the_add_on_off_ends_a_render(plane, watched, monkeypatch):
-    """From another thread, as the window does while the render's own thread runs."""
+    """From another thread, as the window does while the render's own thread runs. It fails, or an animation would go on."""
 
     def leave(progress):
         if progress.passes and not threads:
@@ -368,9 +368,12 @@ def test_switching_the_add_on_off_ends_a_render(plane, watched, monkeypatch):
     threads = []
     watched.on_progress = leave
     plane.cycles.samples = 1 << 20
-    bpy.ops.render.render()
+    with pytest.raises(RuntimeError, match=engine.SWITCHED_OFF):
+        bpy.ops.render.render()
     threads[0].join(5.0)
     assert not threads[0].is_alive() and not engine._running
+    with pytest.raises(RuntimeError, match=engine.SWITCHED_OFF):  # and so does what was about to begin
+        bpy.ops.render.render()
     engine._leaving.clear()
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hands import F12, in_window, leave, press, renders, until, viewport  # noqa: E402
+from hands import F12, in_window, leave, press, renders, until, viewport
 
 WHILE = sys.argv[sys.argv.index("--") + 1]
 

@@ -15,7 +15,7 @@ import bpy
 from mathutils import Euler
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hands import ESCAPE, F12, Ticks, in_window, memory, press, renders, run, until, viewport  # noqa: E402
+from hands import ESCAPE, F12, Ticks, in_window, memory, press, renders, run, until, viewport
 
 given = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
 TIMES = int(given[0]) if given else 10

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hands import ESCAPE, F12, in_window, press, renders, run, until  # noqa: E402
+from hands import ESCAPE, F12, in_window, press, renders, run, until
 
 ended = []  # how each render did, in the order of their ends
 
