@@ -2,6 +2,7 @@
 
 The cache is biased on purpose: tolerances below are the bias that its settings allow, and are stated as numbers."""
 
+import itertools
 import math
 import time
 
@@ -10,6 +11,7 @@ import pytest
 from agreement_scenes import SCENES, camera
 from light_scenes import f32, lamp, matrix, triangle_scene
 from test_closed_forms import cube, lambert, probe, quad, scene_of, shiny, sphere, surface
+from test_lights import image_sky
 
 from gi_engine import native
 from gi_engine import scene_data as sd
@@ -276,6 +278,74 @@ def test_blotches_fade_as_records_are_refined():
     assert refined < 0.25 * once, (refined, once)
 
 
+def between_seeds(images):
+    """Relative variance of one of them, in its pixels."""
+    return float((np.var(images, 0, ddof=1) / np.mean(images, 0) ** 2).mean())
+
+
+def test_smoothing_takes_blotches_away_and_no_light():
+    """Light that comes by way of a small bright patch: records of few rays, and their noise has a long tail."""
+
+    def wall(seed, smoothing, integrator="irradiance_cache", samples=16):
+        bulb = lamp("SPOT", (300.0,) * 3, matrix=matrix((0, 0, 0.5), (1, 0, 0), (0, -1, 0), (0, 0, -1)), spot_size=0.4)
+        scene = scene_of((cube(), surface(0.5)), lights=[bulb])
+        scene.camera = sd.Camera("camera", "ORTHO", matrix((0, 0, 0)), (-0.9, 0.9, -0.9, 0.9), 0.0, 100.0)
+        more = {"record_samples": 64, "refinement": 0, "smoothing": smoothing} if integrator != "path" else {}
+        (image,), _ = render(scene, seed, samples=samples, integrator=integrator, **more)
+        return image[..., 0].reshape(8, 4, 8, 4).mean((1, 3))
+
+    truth = np.array([wall(seed, 0, "path", 512) for seed in (8, 9)])
+    rough, smooth = (np.array([wall(seed, s) for seed in range(1, 9)]) for s in (0, 3))
+    middle = np.s_[:, 2:6, 2:6]  # elsewhere walls leave few neighbours
+    assert between_seeds(smooth[middle]) < 0.45 * between_seeds(rough[middle])
+    means = smooth.mean((1, 2))
+    error = math.hypot(means.std(ddof=1) / math.sqrt(len(means)), np.ptp(truth.mean((1, 2))))
+    assert abs(means.mean() - truth.mean()) < 4 * error + 0.005 * truth.mean()
+    off = np.abs(smooth.mean(0) - truth.mean(0))
+    assert (off < 0.03 * truth.mean() + 6 * smooth.std(0, ddof=1) / math.sqrt(len(smooth)) + np.ptp(truth, 0)).all()
+
+
+def test_records_that_are_sure_are_left_as_they_are():
+    """A shadow's edge in indirect light, records of many rays: smoothing must not blur what no noise hides."""
+
+    def picture(smoothing):
+        scene = SCENES["smooth normals"]()
+        scene.camera = camera()
+        (image,), _ = render(scene, samples=16, record_samples=8192, refinement=0, smoothing=smoothing)
+        return image[..., :3]
+
+    assert np.abs(picture(3) - picture(0)).max() < 0.02 * picture(0).mean()
+
+
+def test_the_sky_is_cached_and_the_sun_is_not():
+    """A room open to one side, under a sky with a small bright sun in it: the picture is path tracing's, with less grain."""
+
+    def floor(seed, integrator="irradiance_cache", samples=16, **parameters):
+        scene = image_sky(sun=3000.0)
+        corners = list(itertools.product((-1, 1), repeat=3))
+        for axis, side in ((0, -1), (1, -1), (1, 1), (2, -1), (2, 1)):
+            a, b, c, d = (p for p in corners if p[axis] == side)
+            scene.meshes.append(quad(a, b, d, c))
+            scene.programs.append(surface(0.5))
+            scene.instances.append(
+                sd.Instance(f"wall {axis} {side}", len(scene.meshes) - 1, matrix(), [len(scene.programs) - 1])
+            )
+        scene.camera = sd.Camera("camera", "ORTHO", matrix((0, 0, 0)), (-0.9, 0.9, -0.9, 0.9), 0.0, 100.0)
+        (image,), _ = render(scene, seed, samples=samples, integrator=integrator, **parameters)
+        return image[..., 0]
+
+    path = np.array([floor(seed, "path", 512) for seed in range(1, 5)])
+    cached, sampled = (np.array([floor(seed, cached_sky=limit) for seed in range(1, 5)]) for limit in (4.0, 0.0))
+    assert between_seeds(cached) < 0.5 * between_seeds(sampled)
+    for found in (cached, sampled):
+        means = found.mean((1, 2))
+        error = math.hypot(means.std(ddof=1), path.mean((1, 2)).std(ddof=1)) / 2
+        assert abs(means.mean() - path.mean()) < 4 * error + 0.01 * path.mean()
+    blocks = [a.reshape(4, 8, 4, 8, 4).mean((2, 4)) for a in (cached, path)]
+    error = np.sqrt(sum(b.var(0, ddof=1) / len(b) for b in blocks))
+    assert (np.abs(blocks[0].mean(0) - blocks[1].mean(0)) < 0.03 * path.mean() + 6 * error).all()
+
+
 def test_caustics_leave_grain_and_no_spots():
     """What a mirror ball throws of a small lamp on a wall: the same light, whether records know all of it or what is not too bright."""
 
@@ -289,7 +359,7 @@ def test_caustics_leave_grain_and_no_spots():
     truth = np.mean([wall(seed, "bdpt", 512) for seed in (8, 9)], 0)
     spots = {}
     for limit in (10.0, 1e9):
-        found = np.array([wall(seed, cached_caustics=limit, refinement=0) for seed in range(1, 9)])
+        found = np.array([wall(seed, cached_caustics=limit, refinement=0, smoothing=0) for seed in range(1, 9)])
         means = found.mean((1, 2))
         assert abs(means.mean() - truth.mean()) < 4 * means.std(ddof=1) / math.sqrt(len(means)) + 0.01 * truth.mean()
         spots[limit] = np.mean(found > 1.25 * truth)

@@ -479,6 +479,24 @@ def test_world_map_finds_all_light(fields):
     assert error < 0.01 * expected
 
 
+@pytest.mark.parametrize("radiance", [0.0, 0.3, 0.9, 50.0])
+def test_share_of_the_worlds_light_above_a_radiance(radiance):
+    """By the importance map, which is a little blurred."""
+    lights = build(image_sky())
+    n = 1536
+    s, t = (a.ravel() for a in np.meshgrid((np.arange(n) + 0.5) / n, (np.arange(n) + 0.5) / n, indexing="ij"))
+    found = lights.eval(ORIGIN, UP, Equirectangular().point(s, t).astype(np.float32))[:, 0]
+    weight = np.sin(np.pi * s)
+    expected = (np.maximum(found - radiance, 0) * weight).sum() / (found * weight).sum()
+    assert lights.world_share_above(radiance) == pytest.approx(expected, abs=0.03)
+
+
+def test_share_of_an_even_world_above_a_radiance():
+    lights = build(with_world(sd.Scene(), emission(strength=2.0)))
+    assert lights.world_share_above(0.5) == pytest.approx(0.75)
+    assert lights.world_share_above(2.0) == 0.0
+
+
 def test_world_without_sampling_is_left_to_rays():
     lights = build(image_sky(sampling="NONE"))
     assert lights.count == 0

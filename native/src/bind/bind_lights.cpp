@@ -83,6 +83,8 @@ class TestLights {
     return out;
   }
 
+  float world_share_above(float radiance) const { return lights_->world_share_above(radiance); }
+
   // u_choice; u: place and direction, in turns. Columns: origin, direction, power, light (−1: none), the power by the ray's density at
   // a point `along` metres further on, and pdf_dir there.
   Table emit(Rows u_place, Rows u_direction, float along) const {
@@ -175,6 +177,7 @@ void bind_lights(nb::module_& m) {
       .def("pick_probabilities", &TestLights::pick_probabilities, nb::arg("position"), nb::arg("normal"), nb::arg("transmission") = false)
       .def("emit", &TestLights::emit, nb::arg("u_place"), nb::arg("u_direction"), nb::arg("along") = 1.0f)
       .def("pdf_emit", &TestLights::pdf_emit)
+      .def("world_share_above", &TestLights::world_share_above)
       .def("time", &TestLights::time)
       .def_prop_ro("count", &TestLights::count)
       .def_prop_ro("description", &TestLights::description)

@@ -8,19 +8,22 @@ namespace gi {
 namespace {
 
 constexpr LightSampling kMode = LightSampling::kMis;
+constexpr uint8_t kDiffuseLobes = kReflection | kTransmission | kDiffuse;
 
 // A path under way. What it finds of luminaires and what of anything else may count differently: luminaires are sampled at every
 // surface, also where all other light came from the cache. Of luminaires that it finds by way of mirrors and clear glass, the cache
-// has what does not exceed a limit: the rest, which would leave bright spots around records, counts where it is found.
+// has what does not exceed a limit: the rest, which would leave bright spots around records, counts where it is found. So it is with the
+// sky: the cache has what does not exceed a limit, and only the rest is sampled at every surface.
 struct Walk {
   CameraPath path;            // its throughput is for all but luminaires
   Rgb to_luminaires{1.0f};
+  Rgb to_known_sky{};         // the part of that whose sky the cache has; negative: brings it there
   Rgb to_excess{};            // of that rest; negative: leaves it out
   Rgb mirrors{1.0f};          // throughput of the mirrors since the last other surface
   bool by_mirror = false;     // there are some
   float first_distance = kInf;
 
-  bool is_over() const { return is_black(to_luminaires) && is_black(to_excess); }
+  bool is_over() const { return is_black(to_luminaires) && is_black(to_known_sky) && is_black(to_excess); }
 };
 
 class IrradianceCacheIntegrator final : public Integrator {
@@ -33,17 +36,23 @@ class IrradianceCacheIntegrator final : public Integrator {
         no_caustics_(no_caustics(p)),
         filter_glossy_(p.real("filter_glossy")),
         cached_caustics_(p.real("cached_caustics")),
+        cached_sky_(p.real("cached_sky")),
         records_({p.real("error"),
                   p.integer("record_samples"),
                   p.integer("cached_bounces"),
                   p.real("refinement"),
+                  p.real("smoothing"),
                   {p.real("min_spacing"), p.real("max_spacing"), p.real("min_length"), p.real("max_length")},
                   limits_}) {}
 
+  void prepare(const RenderContext& context) override {
+    known_sky_ = cached_sky_ * context.lights.world_radiance();
+    sky_share_ = context.lights.world_share_above(known_sky_);
+  }
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     records_.before_pass(context, film, pass, [&](const CameraRay& from, const PathState& state, Sampler& sampler) -> GatheredRay {
       // Luminaires are sampled where the record is used. Of deeper records many are averaged: bright spots do no harm there.
-      Walk walk{CameraPath(from), Rgb(), records_.level_of(state) == 1 ? Rgb(-1.0f) : Rgb()};
+      Walk walk{CameraPath(from), Rgb(), Rgb(-1.0f), records_.level_of(state) == 1 ? Rgb(-1.0f) : Rgb()};
       walk.path.state = state;
       walk.path.state.without = no_caustics_;
       walk.path.seen_from_camera = false;
@@ -71,6 +80,9 @@ class IrradianceCacheIntegrator final : public Integrator {
   uint8_t no_caustics_;  // CausticFlags of what is left out
   float filter_glossy_;
   float cached_caustics_;  // radiance
+  float cached_sky_;       // times the sky's mean
+  float known_sky_ = 0;    // radiance
+  float sky_share_ = 1;    // of the sky's light, what exceeds that
   IrradianceRecords records_;
 };
 
@@ -85,8 +97,8 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     result.radiance += clamp_contribution(throughput * radiance, depth > 1 ? clamp_indirect_ : clamp_direct_);
   };
 
-  const auto add_luminaire = [&](Rgb radiance, int depth) {
-    add(walk.to_luminaires, radiance, depth);
+  const auto add_luminaire = [&](Rgb radiance, int depth, Rgb known = {}) {
+    add(Rgb(1.0f), walk.to_luminaires * radiance - known, depth);
     if (walk.by_mirror) add(walk.to_excess, positive(walk.mirrors * radiance - Rgb(cached_caustics_)), depth);
   };
 
@@ -97,7 +109,9 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     const auto hit = context.scene.intersect(path.ray, visibility);
     add_luminaire(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, kMode, visibility), depth);
     if (!hit) {
-      if (path.seen_from_camera || !walk.is_over()) add_luminaire(path.leave(context, film, kMode, result), depth);
+      if (!path.seen_from_camera && walk.is_over()) break;
+      const LightBeyond beyond = path.leave(context, film, kMode, result);
+      add_luminaire(beyond, depth, walk.to_known_sky * min(beyond.world, Rgb(known_sky_)) * beyond.world_weight);
       break;
     }
     if (bounce == 0) walk.first_distance = hit->t;
@@ -120,14 +134,22 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     // Luminaires are sampled here; other light of the diffuse lobes is looked up.
     const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
     const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
+    LightQuery query = light_query(point, bsdf);
     bool is_cached = false;
     if (may_scatter && !is_black(path.throughput)) {
-      add(path.throughput, sample_direct_light(context, point, bsdf, kMode, u_light_choice, u_light), depth + 1);
       if (bsdf.flags() & kDiffuse) {
         const auto radiance = records_.read(point, bsdf, result);
         if (radiance) result.radiance += path.throughput * *radiance;
         is_cached = bool(radiance);
       }
+      if (is_cached && !(bsdf.flags() & kGlossy)) query.world_share = sky_share_;
+      const auto scattered = [&](const LightSample& light, const LobeEval& e) {
+        const bool is_known = is_cached && context.lights.is_world(light.light);
+        const Rgb known = is_known ? bsdf.eval(point.wo, light.wi, kDiffuseLobes).value : Rgb();
+        return e.value * light.radiance - known * min(light.radiance, Rgb(known_sky_));
+      };
+      const auto pdf_of = [](Vec3, const LobeEval& e) { return e.pdf_dir; };
+      add(path.throughput, sample_direct_light(context, query, point, bsdf, kMode, u_light_choice, u_light, pdf_of, scattered), depth + 1);
     }
 
     // Draw the next direction.
@@ -138,7 +160,7 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     path.travelled += hit->t;
     if (transparent) {
       const Rgb weight = next->value / next->pdf_dir;
-      path.throughput *= weight, walk.to_luminaires *= weight, walk.to_excess *= weight;
+      path.throughput *= weight, walk.to_luminaires *= weight, walk.to_known_sky *= weight, walk.to_excess *= weight;
       if (!advance(path.state, next->flags, limits_)) break;
       path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, path.ray.t_max - hit->t};
       path.origin.query.path = path.state;
@@ -149,12 +171,14 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     const bool delta = next->flags & kSpecular;
     const Rgb weight = next->value / next->pdf_dir;
     walk.to_luminaires = path.throughput * weight;
+    walk.to_known_sky = Rgb();
     if (delta) {
       walk.mirrors *= weight;
       walk.to_excess = may_mirror ? walk.to_excess : Rgb();
       path.throughput *= weight;
     } else {
-      const Rgb known = is_cached ? bsdf.eval(point.wo, next->wi, kReflection | kTransmission | kDiffuse).value / next->pdf_dir : Rgb();
+      const Rgb known = is_cached ? bsdf.eval(point.wo, next->wi, kDiffuseLobes).value / next->pdf_dir : Rgb();
+      walk.to_known_sky = path.throughput * known;
       walk.mirrors = Rgb(1.0f);
       walk.to_excess = records_.level_of(point.path) == 0 ? path.throughput * known : Rgb();
       path.throughput *= positive(weight - known);
@@ -166,7 +190,7 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
       path.seen_from_camera = false;
     path.state.without = next->flags & kDiffuse ? no_caustics_ : 0;
-    path.origin = {light_query(point, bsdf), delta ? kInf : next->pdf_dir};
+    path.origin = {query, delta ? kInf : next->pdf_dir};
     if (!delta) least_pdf = std::min(least_pdf, next->pdf_dir);
     path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
 
@@ -194,10 +218,16 @@ const Descriptor& irradiance_cache_descriptor() {
            "Rays over the hemisphere of each record, to begin with and each time that it is refined"},
           {"refinement", "Refinement", Kind::kFloat, 0.25, 0, 0.95,
            "Share of the passes' time in which records get more rays: blotches fade as noise does. 0 leaves them as they were first"},
+          {"smoothing", "Smoothing", Kind::kFloat, 3, 0, 10,
+           "Evens out neighbouring records as far as their noise hides the difference: so many standard deviations. 0 leaves blotches"},
           {"cached_bounces", "Cached Bounces", Kind::kInt, 4, 1, IrradianceRecords::kMostLevels,
            "Diffuse bounces that have records; further ones are path traced"},
           {"cached_caustics", "Cached Caustics", Kind::kFloat, 10, 0, 1e9,
            "Radiance up to which what mirrors and glass throw is cached; what exceeds it is path traced: grain instead of bright spots"},
+          {"cached_sky", "Cached Sky", Kind::kFloat, 4, 0, 1e9,
+           "Radiance up to which light of the sky is cached, times the mean of the sky; what exceeds it, as the sun does, is sampled "
+           "directly "
+           "at every surface. 0 samples all of it directly: sharper, but grain in rooms"},
           {"min_spacing", "Minimum Spacing", Kind::kFloat, 1.5, 0, 1e4, "Pixels for which a record holds at least"},
           {"max_spacing", "Maximum Spacing", Kind::kFloat, 40, 1, 1e6, "Pixels for which a record holds at most"},
           {"min_length", "Minimum Distance", Kind::kFloat, 0, 0, 1e6, "The same as a length", "LENGTH"},
@@ -218,7 +248,7 @@ const Descriptor& irradiance_cache_descriptor() {
       },
       [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<IrradianceCacheIntegrator>(p); },
       /*bakes=*/false,
-      /*kept_version=*/3,
+      /*kept_version=*/4,
       /*kept_by_place=*/true};
   return descriptor;
 }

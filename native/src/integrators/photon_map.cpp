@@ -115,7 +115,7 @@ class PhotonMapIntegrator final : public Integrator {
         most_bytes_(size_t(p.integer("photon_memory")) << 20),
         way_(GlobalLight(p.integer("global_light"))),
         s_(settings(p, gathers())),
-        records_({p.real("record_error"), p.integer("record_samples"), 1, kRefinement, kSpacing, s_.limits}) {}
+        records_({p.real("record_error"), p.integer("record_samples"), 1, kRefinement, kSmoothing, kSpacing, s_.limits}) {}
 
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     if (!built_) build(context, film);
@@ -159,6 +159,7 @@ class PhotonMapIntegrator final : public Integrator {
  private:
   static constexpr const char *kGlobal = "global", *kCaustic = "caustic";
   static constexpr float kRefinement = 0.25f;  // of the cache, which is the same as that of irradiance caching
+  static constexpr float kSmoothing = 3.0f;  // standard deviations, the same
   static constexpr IrradianceSpacing kSpacing{1.5f, 40.0f, 0.0f, 0.0f};
 
   static constexpr int kBatches = 8;  // of photons

@@ -135,8 +135,9 @@ struct LightSet::Impl {
     if (query.transmission) c = std::abs(c);
     return sun.irradiance() * lamp.strength * std::max(c, 0.02f);
   }
+  float world_weight(const LightQuery& query) const { return world.emits() ? world.irradiance() * query.world_share : 0.0f; }
   float far_weight(const LightQuery& query) const {
-    float sum = world.emits() ? world.irradiance() : 0.0f;
+    float sum = world_weight(query);
     for (uint32_t k = 0; k < suns.size(); ++k) sum += sun_weight(k, query);
     return sum;
   }
@@ -158,7 +159,7 @@ struct LightSet::Impl {
       if (x < weight) return LightTree::Pick{light, (1.0f - local) * weight / far};
       x -= weight;
     }
-    if (world.emits()) light = world_light(), weight = world.irradiance();
+    if (world_weight(query) > 0.0f) light = world_light(), weight = world_weight(query);
     return LightTree::Pick{light, (1.0f - local) * weight / far};
   }
 
@@ -169,7 +170,7 @@ struct LightSet::Impl {
       return local > 0.0f ? local * tree.probability(query, root, tree_slot[light]) : 0.0f;
     }
     if (!(far > 0.0f)) return 0.0f;
-    if (light == world_light()) return (1.0f - local) * world.irradiance() / far;
+    if (light == world_light()) return (1.0f - local) * world_weight(query) / far;
     const auto k = std::find(suns.begin(), suns.end(), light);
     return k == suns.end() ? 0.0f : (1.0f - local) * sun_weight(uint32_t(k - suns.begin()), query) / far;
   }

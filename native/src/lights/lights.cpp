@@ -20,6 +20,8 @@ uint32_t LightSet::light_of_triangle(uint32_t instance, uint32_t triangle) const
 }
 uint32_t LightSet::light_of_sun(uint32_t sun) const { return impl_->suns[sun]; }
 uint32_t LightSet::world_light() const { return impl_->world_light(); }
+float LightSet::world_radiance() const { return impl_->world.radiance(); }
+float LightSet::world_share_above(float radiance) const { return impl_->world.share_above(radiance); }
 uint32_t LightSet::sun_count() const { return uint32_t(impl_->suns.size()); }
 
 std::optional<LightSample> LightSet::sample(const LightQuery& query, float u_choice, Vec2 u) const {

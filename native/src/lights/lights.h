@@ -14,6 +14,7 @@ struct LightQuery {
   Vec3 normal;                // shading normal; zero where there is none (volumes)
   bool transmission = false;  // the surface also scatters from below
   PathState path;
+  float world_share = 1.0f;   // of the world's light, for choosing: the rest is known otherwise
 };
 
 struct LightSample {
@@ -75,6 +76,8 @@ class LightSet {
   float pdf_triangle(const LightQuery& from, const ShadingPoint& point) const;
   // Density with which `sample` picks `direction` on the world.
   float pdf_world(const LightQuery& from, Vec3 direction) const;
+  float world_radiance() const;                   // its mean over the sphere, |luminance|; 0 where it is not sampled
+  float world_share_above(float radiance) const;  // of the world's light, what exceeds `radiance`, about
   // Probability with which `sample` picks the light.
   float pick_probability(const LightQuery& query, uint32_t light) const;
   // A luminaire chosen by its power, a place on it and a direction: where light starts.

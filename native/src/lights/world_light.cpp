@@ -118,6 +118,31 @@ WorldLight::WorldLight(const Scene& scene, int threads) {
   map_ = Distribution2D(density, width, height);
 }
 
+float WorldLight::share_above(float radiance) const {
+  if (map_.empty()) return mean_ > radiance ? 1.0f - radiance / mean_ : 0.0f;
+  const int width = map_.width(), height = map_.height();
+  const float all = mean_ * (1.0f + kFloor);  // the map's radiance where its density is that of the whole sphere
+  double above = 0, sum = 0;
+  const auto add = [&](float value, double solid_angle) {
+    above += solid_angle * double(std::max(value - kFloor * mean_ - radiance, 0.0f)), sum += solid_angle * double(value);
+  };
+  for (int y = 0; y < height; ++y) {
+    const float s = std::sin(kPi * (float(y) + 0.5f) / float(height));
+    for (int x = 0; x < width; ++x) {
+      const Texel t{x, y};
+      const float value = all * map_.pdf(t.place({0.5f, 0.5f}, map_)) * (2.0f / kPi) / s;
+      const Distribution2D* fine = refinement(t);
+      if (!fine) {
+        add(value, s);
+        continue;
+      }
+      for (int i = 0; i < kFine * kFine; ++i)
+        add(value * fine->pdf({(float(i % kFine) + 0.5f) / kFine, (float(i / kFine) + 0.5f) / kFine}), s / (kFine * kFine));
+    }
+  }
+  return float(above / sum);
+}
+
 // The brightest texels get maps of their own, and by them a better estimate of what they are worth.
 void WorldLight::refine(const Scene& scene, std::vector<float>& density, int width, ThreadPool& pool) {
   const int height = width / 2;

@@ -14,7 +14,10 @@ class WorldLight {
   WorldLight(const Scene& scene, int threads);
 
   bool emits() const { return mean_ > 0.0f; }
+  float radiance() const { return mean_; }          // |luminance|, mean over the sphere
   float irradiance() const { return kPi * mean_; }  // on a surface that sees all of its hemisphere, about
+  // Of all its light, what exceeds `radiance`, by the importance map: about.
+  float share_above(float radiance) const;
   std::pair<Vec3, float> sample(const LightQuery& query, Vec2 u) const {
     if (map_.empty()) {
       const Vec3 wi = sample_around(query, u);

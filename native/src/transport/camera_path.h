@@ -99,14 +99,14 @@ struct CameraPath {
   float footprint(const CameraRay& camera, const Hit& hit) const { return camera.footprint + camera.spread * (travelled + hit.t); }
 
   // The ray leaves the scene: suns and the world, or a hole in the picture where the film is transparent. Returns radiance.
-  Rgb leave(const RenderContext& context, const Film& film, LightSampling mode, PixelSample& sample) const {
+  LightBeyond leave(const RenderContext& context, const Film& film, LightSampling mode, PixelSample& sample) const {
     if (seen_from_camera && film.spec().transparent) {
       sample.alpha -= average(throughput);
-      return Rgb();
+      return {};
     }
     record_world(context, sample);
-    const Rgb beyond = light_beyond(context, ray, origin, mode, state);
-    if (seen_from_camera) sample.environment += throughput * beyond;
+    const LightBeyond beyond = light_beyond(context, ray, origin, mode, state);
+    if (seen_from_camera) sample.environment += throughput * Rgb(beyond);
     return beyond;
   }
 

@@ -64,18 +64,27 @@ inline Rgb shadowed(const RenderContext& context, const ShadingPoint& point, con
   return contribution * context.scene.transmittance(ray, point.path) * through_media(context, point, ray, media);
 }
 
-// One light, chosen by its importance: f cos L V / p, weighed. `pdf_of(wi, e)` is the density with which the next ray
+// One light, chosen by its importance: `scattered(light, e)` V / p, weighed. `pdf_of(wi, e)` is the density with which the next ray
 // would be drawn towards wi.
-template <class PdfOf>
-Rgb sample_direct_light(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, LightSampling mode, float u_choice,
-                        Vec2 u, const PdfOf& pdf_of, const Media* media = nullptr) {
+template <class PdfOf, class Scattered>
+Rgb sample_direct_light(const RenderContext& context, const LightQuery& query, const ShadingPoint& point, const Bsdf& bsdf,
+                        LightSampling mode, float u_choice, Vec2 u, const PdfOf& pdf_of, const Scattered& scattered,
+                        const Media* media = nullptr) {
   if (mode == LightSampling::kOff || bsdf.is_delta()) return Rgb();
-  const auto light = context.lights.sample(light_query(point, bsdf), u_choice, u);
+  const auto light = context.lights.sample(query, u_choice, u);
   if (!light || is_black(light->radiance) || !(light->pdf_dir > 0.0f)) return Rgb();
   const LobeEval e = eval_for_light(bsdf, point.wo, *light);
   const bool found_otherwise = mode == LightSampling::kMis && !light->is_delta && light->use_mis;
   const float weight = found_otherwise ? power_heuristic(light->pdf_dir, pdf_of(light->wi, e)) : 1.0f;
-  return shadowed(context, point, *light, e.value * light->radiance * (weight / light->pdf_dir), media);
+  return shadowed(context, point, *light, scattered(*light, e) * (weight / light->pdf_dir), media);
+}
+
+// All that its lobes scatter: f cos L.
+template <class PdfOf>
+Rgb sample_direct_light(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, LightSampling mode, float u_choice,
+                        Vec2 u, const PdfOf& pdf_of, const Media* media = nullptr) {
+  const auto all = [](const LightSample& light, const LobeEval& e) { return e.value * light.radiance; };
+  return sample_direct_light(context, light_query(point, bsdf), point, bsdf, mode, u_choice, u, pdf_of, all, media);
 }
 
 inline Rgb sample_direct_light(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, LightSampling mode,
@@ -114,22 +123,27 @@ inline Rgb lamps_along(const RenderContext& context, Ray ray, float t_surface, c
   return sum;
 }
 
-// Suns and the world, seen by a ray that leaves the scene.
-inline Rgb light_beyond(const RenderContext& context, const Ray& ray, const RayOrigin& from, LightSampling mode, const PathState& path) {
+// Suns and the world, seen by a ray that leaves the scene: weighed, all in all and the world alone.
+struct LightBeyond {
+  Rgb suns, world;
+  float world_weight = 1.0f;
+
+  operator Rgb() const { return suns + world * world_weight; }
+};
+inline LightBeyond light_beyond(const RenderContext& context, const Ray& ray, const RayOrigin& from, LightSampling mode,
+                                const PathState& path) {
   const uint32_t visibility = visibility_of(path.kind);
-  Rgb sum;
+  LightBeyond found;
   for (uint32_t sun = 0; sun < context.lights.sun_count(); ++sun) {
     const LightEval e = context.lights.eval_sun(sun, from.query, ray.direction, visibility);
-    if (!is_black(e.radiance)) sum += e.radiance * found_weight(mode, from.pdf_dir, e.pdf_dir);
+    if (!is_black(e.radiance)) found.suns += e.radiance * found_weight(mode, from.pdf_dir, e.pdf_dir);
   }
   if (context.scene.data().world.visibility & visibility) {
-    const Rgb radiance = context.scene.world_radiance(ray.direction, path);
-    if (!is_black(radiance)) {
-      const bool weighed = mode != LightSampling::kOff && std::isfinite(from.pdf_dir);
-      sum += radiance * (weighed ? found_weight(mode, from.pdf_dir, context.lights.pdf_world(from.query, ray.direction)) : 1.0f);
-    }
+    found.world = context.scene.world_radiance(ray.direction, path);
+    const bool weighed = mode != LightSampling::kOff && std::isfinite(from.pdf_dir) && !is_black(found.world);
+    if (weighed) found.world_weight = found_weight(mode, from.pdf_dir, context.lights.pdf_world(from.query, ray.direction));
   }
-  return sum;
+  return found;
 }
 
 // Emission of the surface that a ray met, weighed.

@@ -53,6 +53,10 @@ GatheredIrradiance gather_irradiance(Vec3 position, Vec3 normal, int samples, co
   record.radius = inverse_distances > 0.0f ? float(strata.count()) / inverse_distances : kInf;
   result.nearest *= strata.least_aim();
 
+  for (int j = 0; j < rings; ++j)
+    for (int k = 0; k < sectors; ++k) result.variance += 0.5f * sqr(luminance(at(j, k).radiance) - luminance(at(j, k - 1).radiance));
+  result.variance *= sqr(kPi / float(strata.count()));
+
   const float wedge = 2.0f * kPi / float(sectors);
   for (int k = 0; k < sectors; ++k) {
     const float phi = wedge * (float(k) + 0.5f), phi_before = wedge * float(k);

@@ -26,6 +26,7 @@ struct HemisphereStrata {
 struct GatheredIrradiance {
   IrradianceRecord record;  // its radius is the harmonic mean
   float nearest = kInf;  // metres; no wall is nearer
+  float variance = 0;    // of the irradiance's luminance, (W/m²)²: by differences of neighbouring strata, rather too much
 };
 
 // `ray(index, direction)`: about `samples` of them, one for each stratum; `jitter(index)` places it therein.

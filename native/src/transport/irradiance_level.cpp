@@ -7,6 +7,7 @@ namespace gi {
 namespace {
 
 constexpr float kLeastReach = 0.5f;  // pixels
+constexpr int kBatch = 256;
 
 // Calls f(a's, b's) for each colour that gathering finds.
 template <class F>
@@ -44,20 +45,37 @@ IrradianceRecord IrradianceLevel::settled(const IrradiancePlace& place, const Ga
 }
 
 void IrradianceLevel::insert(const IrradiancePlace& place, const GatheredIrradiance& gathered) {
-  cache_.insert(settled(place, gathered));
+  const IrradianceRecord record = settled(place, gathered);
+  cache_.insert(record);
   growth_.push_back({place});
+  gathered_.push_back({record, gathered.variance});
 }
 
-void IrradianceLevel::improve(size_t index, const GatheredIrradiance& gathered, int pass) {
-  Growth& g = growth_[index];
-  IrradianceRecord record = cache_.records()[index], more = gathered.record;
-  const float passes = float(pass - g.changed);
-  for_each_colour(g.seen, record, [&](Rgb& sum, Rgb value) { sum += value * passes; });
-  g.changed = pass;
-  temper(more, record.radius);
-  const float share = 1.0f / ++g.gathers;
-  for_each_colour(record, more, [&](Rgb& mean, Rgb value) { mean += (value - mean) * share; });
-  cache_.set_light(index, record);
+void IrradianceLevel::improve(size_t index, const GatheredIrradiance& gathered) {
+  IrradianceRecord more = gathered.record;
+  temper(more, cache_.records()[index].radius);
+  auto& [light, variance] = gathered_[index];
+  const float share = 1.0f / ++growth_[index].gathers;
+  for_each_colour(light, more, [&](Rgb& mean, Rgb value) { mean += (value - mean) * share; });
+  variance = variance * sqr(1.0f - share) + gathered.variance * sqr(share);
+  ++improved_;
+}
+
+void IrradianceLevel::smooth(ThreadPool& pool, const std::atomic<bool>& cancelled, int pass, size_t first) {
+  if (smoothing_.size() != size()) smoothing_ = IrradianceSmoothing(cache_, pool, cancelled);
+  if (cancelled) return;
+  pool.for_each(int((size() + kBatch - 1) / kBatch), cancelled, [&](int batch) {
+    for (size_t i = std::max(first, size_t(batch) * kBatch); i < std::min(size(), size_t(batch + 1) * kBatch); ++i) {
+      Growth& g = growth_[i];
+      if (g.fixed) continue;
+      IrradianceRecord record = cache_.records()[i];
+      for_each_colour(g.seen, record, [&](Rgb& sum, Rgb value) { sum += value * float(pass - g.changed); });
+      g.changed = pass;
+      for_each_colour(record, smoothing_.smooth(gathered_, uint32_t(i), strength_), [](Rgb& light, Rgb value) { light = value; });
+      cache_.set_light(i, record);
+    }
+  });
+  improved_ = 0;
 }
 
 double IrradianceLevel::gathers() const {
@@ -79,7 +97,7 @@ std::vector<float> IrradianceLevel::rows(int passes) const {
     record.write(row);
     row += IrradianceRecord::kNumbers;
     for (int k = 0; k < 3; ++k) row[k] = g.place.ng[k];
-    row[3] = g.place.footprint, row[4] = g.place.spread, row[5] = g.gathers;
+    row[3] = g.place.footprint, row[4] = g.place.spread, row[5] = g.gathers, row[6] = gathered_[i].variance;
   }
   return rows;
 }
@@ -89,9 +107,10 @@ void IrradianceLevel::check(const std::vector<float>& rows, const std::string& n
     const IrradianceRecord r = IrradianceRecord::read(&rows[begin]);
     const float* more = &rows[begin + IrradianceRecord::kNumbers];
     bool good = r.radius > 0.0f && r.least >= 0.0f && r.reach > 0.0f && std::isfinite(r.radius) && is_finite(r.irradiance) &&
-                std::isfinite(length_squared(r.position)) && std::abs(length_squared(r.normal) - 1.0f) < 1e-3f && more[5] >= 1.0f;
+                std::isfinite(length_squared(r.position)) && std::abs(length_squared(r.normal) - 1.0f) < 1e-3f && more[5] >= 1.0f &&
+                more[6] >= 0.0f;
     for (int axis = 0; axis < 3; ++axis) good = good && is_finite(r.translation[axis]) && is_finite(r.lateral[axis]);
-    for (int k = 0; k < 6; ++k) good = good && std::isfinite(more[k]);
+    for (int k = 0; k < 7; ++k) good = good && std::isfinite(more[k]);
     require(good, "'" + name + "', row " + std::to_string(begin / kColumns) + ": no irradiance record");
   }
 }
@@ -102,6 +121,7 @@ void IrradianceLevel::take_over(const std::vector<float>& rows, bool fixed) {
     const float* more = &rows[begin + IrradianceRecord::kNumbers];
     cache_.insert(r);
     growth_.push_back({{r.position, {more[0], more[1], more[2]}, r.normal, more[3], more[4]}, more[5], fixed});
+    gathered_.push_back({r, more[6]});
   }
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "transport/irradiance_gather.h"
+#include "transport/irradiance_smoothing.h"
 
 namespace gi {
 
@@ -22,9 +23,10 @@ struct IrradianceSpacing {
 
 class IrradianceLevel {
  public:
-  static constexpr size_t kColumns = IrradianceRecord::kNumbers + 6;
+  static constexpr size_t kColumns = IrradianceRecord::kNumbers + 7;
 
-  IrradianceLevel(Bounds bounds, float error, IrradianceSpacing spacing) : cache_(bounds, error), spacing_(spacing) {}
+  IrradianceLevel(Bounds bounds, float error, IrradianceSpacing spacing, float smoothing)
+      : cache_(bounds, error), spacing_(spacing), strength_(smoothing) {}
 
   const IrradianceCache& cache() const { return cache_; }
   size_t size() const { return cache_.records().size(); }
@@ -33,9 +35,12 @@ class IrradianceLevel {
   bool is_fixed(size_t record) const { return growth_[record].fixed; }
 
   void insert(const IrradiancePlace& place, const GatheredIrradiance& gathered);
-  // As many rays once more for one record, before pass `pass`.
-  void improve(size_t record, const GatheredIrradiance& gathered, int pass);
+  // As many rays once more for one record. No lookup knows before the next `smooth`.
+  void improve(size_t record, const GatheredIrradiance& gathered);
   void freeze() { cache_.freeze(); }
+  // From now on lookups find the light that was gathered, evened out, of all records from `first` on. `pass`: the first to see it.
+  void smooth(ThreadPool& pool, const std::atomic<bool>& cancelled, int pass, size_t first = 0);
+  bool is_worth_smoothing() const { return improved_ > kImproved * gathers(); }
 
   // Rows of kColumns numbers: records as `passes` passes have seen them on average.
   std::vector<float> rows(int passes) const;
@@ -44,7 +49,9 @@ class IrradianceLevel {
   static void check(const std::vector<float>& rows, const std::string& name);
 
  private:
-  // What irradiance a record says is the mean of all gathers; what passes saw of it, the mean over passes.
+  static constexpr double kImproved = 1.0 / 16.0;  // of all gathers
+
+  // What was gathered is the mean of all gathers; what passes saw of it, the mean over passes.
   struct Growth {
     IrradiancePlace place;
     float gathers = 1;
@@ -56,7 +63,11 @@ class IrradianceLevel {
 
   IrradianceCache cache_;
   IrradianceSpacing spacing_;
+  float strength_;
   std::vector<Growth> growth_;
+  std::vector<IrradianceSmoothing::Gathered> gathered_;
+  IrradianceSmoothing smoothing_;
+  double improved_ = 0;  // gathers since the last smoothing
 };
 
 }  // namespace gi

@@ -98,7 +98,7 @@ void IrradianceRecords::after_pass(const RenderContext& context, int pass) {
 void IrradianceRecords::play_overture(const Work& work) {
   const RenderContext& context = work.context;
   for (int level = 0; level < std::max(level_count(), 1); ++level) {
-    levels_.emplace_back(context.scene.bounds(), error_at(level), s_.spacing);
+    levels_.emplace_back(context.scene.bounds(), error_at(level), s_.spacing, s_.smoothing);
     if (!taken_over_.empty()) levels_.back().take_over(taken_over_[size_t(level)], context.steady);
   }
   taken_over_.clear();
@@ -110,8 +110,10 @@ void IrradianceRecords::play_overture(const Work& work) {
   for (int level = level_count() - 1; level >= 0 && !context.cancelled; --level) {
     const double seconds = context.seconds(), left = std::max(kOvertureShare * context.time_limit - seconds, 0.0);
     level_ends_ = seconds + (level > 0 ? kDeeperShare : 1.0) * left;
+    const size_t taken = levels_[size_t(level)].size();  // evened out before they were kept
     fill_level(work, level);
     levels_[size_t(level)].freeze();
+    levels_[size_t(level)].smooth(context.pool, context.cancelled, 0, taken);
   }
   const size_t records = size();
   size_t bytes = 0;
@@ -265,7 +267,7 @@ void IrradianceRecords::refine(const Work& work, int pass) {
       while (record >= levels_[size_t(level)].size()) record -= levels_[size_t(level--)].size();
       if (!levels_[size_t(level)].is_fixed(record)) chosen.push_back({level, record});
     }
-    if (chosen.empty()) return;
+    if (chosen.empty()) break;
     idle = 0;
     std::vector<GatheredIrradiance> made(chosen.size());
     context.pool.for_each(int(chosen.size()), context.cancelled, [&](int i) {
@@ -274,8 +276,10 @@ void IrradianceRecords::refine(const Work& work, int pass) {
     });
     if (context.cancelled) return;
     gathered_ += uint32_t(chosen.size());
-    for (size_t i = 0; i < chosen.size(); ++i) levels_[size_t(chosen[i].level)].improve(chosen[i].record, made[i], pass);
+    for (size_t i = 0; i < chosen.size(); ++i) levels_[size_t(chosen[i].level)].improve(chosen[i].record, made[i]);
   }
+  for (IrradianceLevel& level : levels_)
+    if (level.is_worth_smoothing()) level.smooth(context.pool, context.cancelled, pass);
   refining_rays_ += spent();
 }
 

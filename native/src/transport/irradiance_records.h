@@ -18,6 +18,7 @@ struct IrradianceRecordsSettings {
   int samples;  // rays of a record, each time that it is gathered
   int levels;   // diffuse bounces that have records
   float refinement;  // share of the passes' time in which records get more rays
+  float smoothing;   // standard deviations of their noise by which records may be evened out
   IrradianceSpacing spacing;
   BounceLimits limits;
 };
