@@ -1,15 +1,15 @@
 """Error against a long reference over time: GI Engine's integrators and Cycles, in one run.
 
-    python bench/equal_time.py [--pixels N] [--seconds S …] [--seeds N] [--reference S] [--ways NAME …] [WORD …]
+    python bench/equal_time.py [--pixels N] [--seconds S …] [--seeds N] [--reference S] [--ways NAME …] [--processor] [WORD …]
 
 Each way renders each scene (files, or words in names of the shared scenes) for about S seconds of sampling, once per seed, in a process of
 its own. The error is the relative mean squared one, (x − r) (x − s) / (m² + (mean m / 10)²), of the worst pixels without a thousandth: r and
 s are two long renders by other seeds and m their mean, so that their own noise cancels. `spread` is the same between seeds, which no
 difference between the engines can touch, nor what a biased way is off; `blocks` the error of means over 8 x 8 pixels, in which noise of
-single pixels fades and blotches stay. The references are by the unbiased way that is least noisy per second, or the way --by. Denoising,
-adaptive sampling, clamping and Filter Glossy are off, caustics are on, bounces are the scene's own. Replaces the scenes' rows in
-bench/results/equal_time.json and .md, and
-their pictures side by side."""
+single pixels fades and blotches stay. The references are by the unbiased way that is least noisy per second, or the way --by: vcm where
+caustics of small lamps are seen through glass or in mirrors, which no unbiased way finds. --processor counts seconds of processor time over
+threads, so that other work on the machine matters little. Denoising, adaptive sampling, clamping and Filter Glossy are off, caustics are on,
+bounces are the scene's own. Replaces the scenes' rows in bench/results/equal_time.json and .md, and their pictures side by side."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ WAYS = {
     "cycles": ("CYCLES", ""),
 }
 UNBIASED = ("bdpt", "path")  # of which one makes the reference
-HOW = ("threads", "pixels", "seeds")  # that the figures of a scene depend on
+HOW = ("threads", "pixels", "seeds", "clock")  # that the figures of a scene depend on
 RESULTS = ROOT / "bench" / "results"
 LIMIT = 1800  # seconds
 BLOCK = 8  # pixels
@@ -67,11 +67,14 @@ def render_all(options) -> None:
     if integrator:
         scene.gi_engine.integrator = "path"
 
+    def now() -> float:
+        return time.process_time() / options.threads if options.clock == "processor" else time.perf_counter()
+
     def timed(samples: int, seed: int) -> float:
         cycles.samples, cycles.seed = samples, seed
-        start = time.perf_counter()
+        start = now()
         bpy.ops.render.render(scene=scene.name)
-        return time.perf_counter() - start
+        return now() - start
 
     timed(1, 1)
     start = timed(1, 1)  # reading the scene, and one pass of path tracing
@@ -120,6 +123,7 @@ def run_child(file: Path, way: str, options, seconds, seeds: int, first_seed: in
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, __file__, "--child", str(file), "--into", folder, "--ways", way]
         command += ["--pixels", str(options.pixels), "--threads", str(options.threads), "--seeds", str(seeds)]
+        command += ["--processor"] if options.clock == "processor" else []
         command += ["--first-seed", str(first_seed), "--seconds", *map(str, seconds)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
         lines = [line for line in done.stdout.splitlines() if line.startswith("FOUND")]
@@ -201,7 +205,7 @@ def ratio(step: dict, theirs: list[dict], name: str) -> str:
 def table(rows: list[dict]) -> str:
     lines = ["# Error at equal time\n", "`python bench/equal_time.py`\n"]
     for row in rows:
-        how = ", ".join(f"{row[name]} {name}" for name in HOW if name in row)
+        how = ", ".join(f"{row[name]} {name}" for name in HOW if row.get(name, "wall") != "wall")
         lines += [
             f"## {row['scene']}\n\n{how}; reference by {row['reference']}\n",
             "| way | seconds | samples | relative MSE | of blocks | between seeds | MSE × time, of Cycles' | between seeds × time, of Cycles' |",
@@ -229,6 +233,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--pixels", type=int, default=20_000)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--processor", dest="clock", action="store_const", const="processor", default="wall")
     for hidden in ("--child", "--into"):
         parser.add_argument(hidden, help=argparse.SUPPRESS)
     parser.add_argument("--first-seed", type=int, default=1, help=argparse.SUPPRESS)
