@@ -80,7 +80,9 @@ class GI_Preferences(bpy.types.AddonPreferences):
         row.label(text="")
         found = caches.entries()
         row = row.row()
-        row.label(text=f"{caches.words(sum(entry.size for entry in found))} in {len(found)} caches")
+        row.label(
+            text=f"{caches.words(sum(entry.size for entry in found))} in {len(found)} cache{'s' * (len(found) != 1)}"
+        )
         row.operator("gi_engine.clear_cache", icon="TRASH")
         column.separator()
         column.prop(self, "log_level")

@@ -29,7 +29,9 @@ INPUTS = (
         "Guided by the colours and the directions of surfaces: keeps textures and edges",
     ),
 )
-PREFILTERS = (
+PRE  # Of a parameter, and how Blender is told; what it has no word for stands beside the name.
+UNITS = {"LENGTH": {"unit": "LENGTH"}, "px": {"subtype": "PIXEL"}, "%": {"subtype": "PERCENTAGE"}}
+FILTERS = (
     ("NONE", "None", "The guides are as noisy as they are; tolerant, keeps less detail"),
     ("FAST", "Fast", "The guides are taken for clean: keeps most detail, and their noise"),
     ("ACCURATE", "Accurate", "The guides are denoised first: keeps most detail, takes longest"),
@@ -39,6 +41,8 @@ QUALITY = (
     ("BALANCED", "Balanced", "Between the two"),
     ("FAST", "Fast", "For previews"),
 )
+# Of a parameter, and how Blender is told; what it has no word for stands beside the name.
+UNITS = {"LENGTH": {"unit": "LENGTH"}, "px": {"subtype": "PIXEL"}, "%": {"subtype": "PERCENTAGE"}}
 FILTERS = (
     ("BOX", "Box", "Equal weight over the filter's width"),
     ("GAUSSIAN", "Gaussian", "Bell curve"),
@@ -180,6 +184,9 @@ def property_of(parameter: dict):
     if kind == "ENUM":
         return EnumProperty(items=list(parameter["items"]), **options)
     number, make = {"INT": (int, IntProperty), "FLOAT": (float, FloatProperty)}[kind]
+    options |= UNITS.get(parameter["unit"], {})
+    if parameter["unit"] and parameter["unit"] not in UNITS:
+        options["name"] += f" ({parameter['unit']})"
     return make(min=number(parameter["min"]), max=number(parameter["max"]), **options)
 
 

@@ -19,6 +19,30 @@ BOUNCES = (
     "transparent_bounces",
     "min_bounces",
 )
+# Of integrators: what is rarely changed, and folded away.
+ADVANCED = (
+    "aim",
+    "alpha",
+    "cached_bounces",
+    "cached_caustics",
+    "caustic_count",
+    "continuation",
+    "continuation_constant",
+    "direction_sampling",
+    "global_count",
+    "heuristic",
+    "light_threshold",
+    "max_length",
+    "max_spacing",
+    "min_length",
+    "min_spacing",
+    "only_s",
+    "only_t",
+    "photon_memory",
+    "record_samples",
+    "texel_memory",
+    "weighted",
+)
 CLAMPING = ("clamp_direct", "clamp_indirect")
 CAUSTICS = ("filter_glossy", "caustics_reflective", "caustics_refractive")
 
@@ -48,16 +72,36 @@ class GI_RENDER_PT_integrator(RenderPanel, bpy.types.Panel):
         self.layout.menu("GI_MT_presets", icon="PRESET")
         column = columns(self.layout)
         column.prop(scene.gi_engine, "integrator")
-        own = getattr(scene.gi_engine, scene.gi_engine.integrator, None)
-        for parameter in parameters(scene):
-            if parameter["name"] not in SHARED:
-                row = column.row()
-                row.active = matters(own, parameter["name"])
-                row.prop(own, parameter["name"])
-            elif parameter["name"] == "light_threshold":
-                setting(column, scene, "light_threshold")
+        draw_parameters(column, scene, advanced=False)
         if has_strategies(parameters(scene)):
             self.layout.operator("gi_engine.render_strategies", icon="RENDER_RESULT")
+
+
+class GI_RENDER_PT_advanced(RenderPanel, bpy.types.Panel):
+    bl_label = "Advanced"
+    bl_parent_id = "GI_RENDER_PT_integrator"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and has_any(context.scene, ADVANCED)
+
+    def draw(self, context):
+        draw_parameters(columns(self.layout), context.scene, advanced=True)
+
+
+def draw_parameters(column, scene, advanced: bool) -> None:
+    """The chosen integrator's own, and of those that Cycles has the one that no other panel shows."""
+    own = getattr(scene.gi_engine, scene.gi_engine.integrator, None)
+    for name in (parameter["name"] for parameter in parameters(scene)):
+        if (name in ADVANCED) != advanced:
+            continue
+        if name == "light_threshold":
+            setting(column, scene, name)
+        elif name not in SHARED:
+            row = column.row()
+            row.active = matters(own, name)
+            row.prop(own, name)
 
 
 def matters(own, name: str) -> bool:
@@ -105,7 +149,7 @@ class GI_RENDER_PT_sampling(RenderPanel, bpy.types.Panel):
             row.operator("gi_engine.copy_from_cycles")
             row.operator("gi_engine.follow_cycles")
         else:
-            column.label(text="Settings are shared with Cycles", icon="LINKED")
+            column.label(text="Shared with Cycles", icon="LINKED")
             column.operator("gi_engine.copy_from_cycles", text="Make Own Settings")
 
 
@@ -318,6 +362,7 @@ class GI_VIEWLAYER_PT_override(Panel, bpy.types.Panel):
 
 CLASSES = (
     GI_RENDER_PT_integrator,
+    GI_RENDER_PT_advanced,
     GI_RENDER_PT_cache,
     GI_RENDER_PT_sampling,
     GI_RENDER_PT_viewport,

@@ -9,6 +9,7 @@ import bpy
 import pytest
 
 import gi_engine
+from gi_engine import native
 from gi_engine.ui import compat, object_panels, render_panels
 
 from .conftest import add, mesh
@@ -119,6 +120,33 @@ def test_every_parameter_is_drawn_by_some_panel(scene):
         drawn = {name for panel in render_panels.CLASSES for name in draw(panel, context_of())}
         missing = {p["name"] for p in render_panels.parameters(scene)} - drawn
         assert not missing, integrator
+
+
+def test_what_is_rarely_changed_is_folded_away(scene):
+    scene.gi_engine.integrator = "irradiance_cache"
+    assert {"error", "refinement"} <= set(draw(render_panels.GI_RENDER_PT_integrator, context_of()))
+    assert {"min_spacing", "max_length"} <= set(draw(render_panels.GI_RENDER_PT_advanced, context_of()))
+    assert "DEFAULT_CLOSED" in render_panels.GI_RENDER_PT_advanced.bl_options
+    scene.gi_engine.integrator = "whitted"
+    assert render_panels.GI_RENDER_PT_advanced.poll(context_of()) == any(
+        p["name"] in render_panels.ADVANCED for p in render_panels.parameters(scene)
+    )
+
+
+def test_every_parameter_says_its_unit_and_what_it_does(scene):
+    for descriptor in native.integrators():
+        group = getattr(scene.gi_engine, descriptor["id"]).bl_rna.properties
+        for parameter in descriptor["parameters"]:
+            assert len(parameter["help"]) > 15 or parameter["name"] in render_panels.BOUNCES, parameter
+            prop = group.get(parameter["name"])
+            if prop is None:  # shared with Cycles
+                continue
+            if parameter["unit"] == "LENGTH":
+                assert prop.unit == "LENGTH", parameter["name"]
+            elif parameter["unit"] in ("px", "%"):
+                assert prop.subtype == {"px": "PIXEL", "%": "PERCENTAGE"}[parameter["unit"]], parameter["name"]
+            elif parameter["unit"]:
+                assert parameter["unit"] in prop.name
 
 
 def test_nothing_shows_for_another_engine(scene):

@@ -100,11 +100,17 @@ class Ticks:
         return f"{len(gaps)} ticks, median {gaps[len(gaps) // 2] * 1e3:.0f} ms, 99 % below {gaps[int(0.99 * len(gaps))] * 1e3:.0f} ms, longest {gaps[-1] * 1e3:.0f} ms"
 
 
-def picture(name):
-    """Of the screen, into the folder SCREENSHOTS of the environment where there is one."""
+def picture(name, area=None):
+    """Of the screen or an area of it, into the folder SCREENSHOTS of the environment where there is one."""
     folder = os.environ.get("SCREENSHOTS")
     if folder:
-        subprocess.run(["import", "-silent", "-window", "root", os.path.join(folder, name + ".png")], check=True)
+        crop = ["-crop", "{}x{}+{}+{}".format(area.width, area.height, *corner(area)), "+repage"] if area else []
+        subprocess.run(["import", "-silent", "-window", "root", *crop, os.path.join(folder, name + ".png")], check=True)
+
+
+def corner(area):
+    """The upper left one of an area or region, on the screen."""
+    return area.x, bpy.context.window_manager.windows[0].height - (area.y + area.height)
 
 
 def run(story):

@@ -9,6 +9,7 @@ import statistics
 import sys
 import tempfile
 import time
+from importlib import import_module
 from pathlib import Path
 
 import bpy
@@ -21,6 +22,7 @@ given = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
 TIMES = int(given[0]) if given else 10
 ENGINE = given[1] if len(given) > 1 else "GI_ENGINE"
 MOST_GROWTH = 20.0  # MB, after warm-up
+MOST_HELD = 0.5  # seconds, on a machine that does other things as well
 INTEGRATORS = ("path", "bdpt", "photon_map", "irradiance_cache", "vcm")
 chance = random.Random(7)
 failures = []
@@ -74,20 +76,13 @@ def f12_and_esc(number):
             yield 0.02
 
 
-def pictures():
-    """How many pictures viewports have shown; None where the engine is another's."""
-    from importlib import import_module
-
-    if ENGINE != "GI_ENGINE":
-        return None
-    found = import_module(next(name for name in sys.modules if name.endswith("gi_engine.viewport")))
-    return [view.refiner.picture for view in list(found._open)]
+def engine_module(name):
+    return import_module(next(found for found in sys.modules if found.endswith(f"gi_engine.{name}")))
 
 
 def shown():
-    """A viewport shows a picture of the engine's."""
-    found = pictures()
-    return found is None or any(found)
+    """A viewport shows a picture of the engine's; for others, nobody knows."""
+    return ENGINE != "GI_ENGINE" or any(view.refiner.picture for view in list(engine_module("viewport")._open))
 
 
 def rendered_view():
@@ -140,19 +135,49 @@ def undo_storm(number):
 
 
 def turn_the_view():
-    """The window goes on answering."""
-    viewport().shading.type = "RENDERED"
-    ticks = Ticks()
-    for number in range(TIMES):
-        choose(number)
-        with in_window("VIEW_3D"):
-            region = bpy.context.region_data
-        for _ in range(10):
-            region.view_rotation.rotate(Euler((0, 0, 0.05)))
-            region.update()
-            yield 0.03
-        yield 0.3
-    print(f"storm: {ENGINE}: turning the view: {ticks.end()}\n{ticks.where}", flush=True)
+    """The window goes on answering: as well as where nothing is rendered, for a virtual screen is drawn by the processor."""
+    for shading in ("SOLID", "RENDERED"):
+        viewport().shading.type = shading
+        yield 0.5
+        ours = timed(("draw", "update")) if shading == "RENDERED" else {}
+        ticks = Ticks()
+        for number in range(TIMES):
+            choose(number)
+            with in_window("VIEW_3D"):
+                region = bpy.context.region_data
+            for _ in range(10):
+                region.view_rotation.rotate(Euler((0, 0, 0.05)))
+                region.update()
+                yield 0.03
+            yield 0.3
+        words = "".join(
+            f"; {name} {len(took)} times, longest {1e3 * max(took, default=0):.0f} ms" for name, took in ours.items()
+        )
+        print(f"storm: {ENGINE}: turning the view, {shading.lower()}: {ticks.end()}{words}\n{ticks.where}", flush=True)
+        slow = max((max(took, default=0) for took in ours.values()), default=0)
+        if slow > MOST_HELD:
+            failures.append(f"the engine held the window for {slow:.2f} s")
+
+
+def timed(names):
+    """Seconds of each call of these methods of the engine's viewports, from now on."""
+    if ENGINE != "GI_ENGINE":
+        return {}
+    cls, found = engine_module("viewport").Viewport, {name: [] for name in names}
+    for name, took in found.items():
+        setattr(cls, name, with_times(getattr(cls, name), took))
+    return found
+
+
+def with_times(function, took):
+    def wrapped(*words):
+        start = time.monotonic()
+        try:
+            return function(*words)
+        finally:
+            took.append(time.monotonic() - start)
+
+    return wrapped
 
 
 def add_on(number):

@@ -485,7 +485,7 @@ std::vector<Parameter> with(std::vector<Parameter> others) {
        0,
        0,
        1,
-       "How the ways to make a path are weighed against one another",
+       "How the ways to make a path are weighed against one another: the picture is the same, its noise is not",
        "",
        {{"POWER", "Power", "By the squares of their densities"}, {"BALANCE", "Balance", "By their densities"}}},
       {"min_bounces", "Minimum Bounces", Kind::kInt, 0, 0, 1024, "Bounces before roulette begins"},
@@ -498,7 +498,8 @@ std::vector<Parameter> with(std::vector<Parameter> others) {
       {"clamp_indirect", "Clamp Indirect", Kind::kFloat, 0, 0, 1e9,
        "Largest radiance that one sample may add after a bounce; 0 is off. Loses light"},
       {"connections", "Connections", Kind::kInt, 3, 1, 64,
-       "Vertices from the light that each vertex from the eye is joined to, of all those of 16 light paths"},
+       "Vertices from the light that each vertex from the eye is joined to, of all those of 16 light paths: more make a pass less noisy, "
+       "and slower"},
   };
   all.insert(all.end(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));
   return all;
@@ -542,8 +543,11 @@ const Descriptor& vcm_descriptor() {
             {"CONNECT", "Connection", "Bidirectional path tracing alone"},
             {"MERGE", "Merging", "Progressive photon mapping alone; lights come to diffuse and glossy surfaces as photons only"}}},
           {"photons", "Photons", Kind::kInt, 1000000, 1, 1e9,
-           "Most light paths that are sent out in each pass for merging; no more than pixels"},
-          {"radius", "Radius", Kind::kFloat, 3, 0.1, 1000, "Within which vertices are merged in the first pass, in pixels"},
+           "Most light paths that are sent out in each pass for merging, no more than pixels: more make caustics seen in glass smooth "
+           "sooner"},
+          {"radius", "Radius", Kind::kFloat, 3, 0.1, 1000,
+           "Within which vertices are merged in the first pass: caustics are blurred by as much at first, and noisier where it is small",
+           "px"},
           {"alpha", "Alpha", Kind::kFloat, 0.75, 0.05, 1, "How much of a disc's photons the next pass keeps: less is sharper and noisier"},
       }),
       [](const Parameters& p) -> std::unique_ptr<Integrator> {

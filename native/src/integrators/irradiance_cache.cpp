@@ -213,7 +213,8 @@ const Descriptor& irradiance_cache_descriptor() {
       "Light between diffuse surfaces is worked out at few places and interpolated: smooth interiors soon. Biased by the error allowed; "
       "rough diffuse surfaces are read as if light came to them evenly",
       {
-          {"error", "Error", Kind::kFloat, 0.15, 0.01, 1, "Allowed between records: the smaller, the more of them"},
+          {"error", "Error", Kind::kFloat, 0.15, 0.01, 1,
+           "Allowed between records: less has more of them, shows finer changes of light and takes longer"},
           {"record_samples", "Samples", Kind::kInt, 128, 16, 1 << 20,
            "Rays over the hemisphere of each record, to begin with and each time that it is refined"},
           {"refinement", "Refinement", Kind::kFloat, 0.25, 0, 0.95,
@@ -228,8 +229,10 @@ const Descriptor& irradiance_cache_descriptor() {
            "Radiance up to which light of the sky is cached, times the mean of the sky; what exceeds it, as the sun does, is sampled "
            "directly "
            "at every surface. 0 samples all of it directly: sharper, but grain in rooms"},
-          {"min_spacing", "Minimum Spacing", Kind::kFloat, 1.5, 0, 1e4, "Pixels for which a record holds at least"},
-          {"max_spacing", "Maximum Spacing", Kind::kFloat, 40, 1, 1e6, "Pixels for which a record holds at most"},
+          {"min_spacing", "Minimum Spacing", Kind::kFloat, 1.5, 0, 1e4,
+           "For which a record holds at least: more is smoother where objects meet, and less true there", "px"},
+          {"max_spacing", "Maximum Spacing", Kind::kFloat, 40, 1, 1e6,
+           "For which a record holds at most: less shows finer changes of light on plain walls, and takes longer", "px"},
           {"min_length", "Minimum Distance", Kind::kFloat, 0, 0, 1e6, "The same as a length", "LENGTH"},
           {"max_length", "Maximum Distance", Kind::kFloat, 0, 0, 1e6, "The same as a length; 0 is off", "LENGTH"},
           {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},

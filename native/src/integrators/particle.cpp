@@ -390,10 +390,12 @@ const Descriptor& particle_descriptor() {
       "Light is carried from the luminaires and left in the texels of diffuse surfaces; caustics included. Biased by the size of a texel, "
       "and by reading rough diffuse surfaces as if light came to them evenly",
       {
-          {"particles", "Particles", Kind::kInt, 200000, 1, 1e9, "Sent out in each pass"},
-          {"texel_size", "Texel Size", Kind::kFloat, 0.05, 1e-5, 1e4, "Wished size of the texels that light is gathered in", "LENGTH"},
-          {"texel_memory", "Texel Memory", Kind::kInt, 512, 1, 1 << 20,
-           "MiB that texels may take; they become coarser where it is not enough"},
+          {"particles", "Particles", Kind::kInt, 200000, 1, 1e9,
+           "Sent out in each pass: more make light smooth in fewer passes, which take longer"},
+          {"texel_size", "Texel Size", Kind::kFloat, 0.05, 1e-5, 1e4,
+           "Wished size of the texels that light is gathered in: smaller shows finer shadows and caustics, with more noise", "LENGTH"},
+          {"texel_memory", "Texel Memory", Kind::kInt, 512, 1, 1 << 20, "That texels may take; they become coarser where it is not enough",
+           "MiB"},
           {"direct",
            "Direct Light",
            Kind::kChoice,

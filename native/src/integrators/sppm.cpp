@@ -61,8 +61,10 @@ const Descriptor& sppm_descriptor() {
       "first, "
       "right in the end",
       {
-          {"photons", "Photons", Kind::kInt, 200000, 1, 1e9, "Sent out in each pass"},
-          {"radius", "Radius", Kind::kFloat, 6, 0.1, 1000, "Within which photons are read in the first pass, in pixels"},
+          {"photons", "Photons", Kind::kInt, 200000, 1, 1e9,
+           "Sent out in each pass: more make light smooth in fewer passes, which take longer"},
+          {"radius", "Radius", Kind::kFloat, 6, 0.1, 1000,
+           "Within which photons are read in the first pass: light is blurred by as much at first", "px"},
           {"alpha", "Alpha", Kind::kFloat, 0.6667, 0.05, 1,
            "How much of a disc's photons the next pass keeps: less is sharper and noisier"},
           {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
