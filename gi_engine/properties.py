@@ -29,9 +29,7 @@ INPUTS = (
         "Guided by the colours and the directions of surfaces: keeps textures and edges",
     ),
 )
-PRE  # Of a parameter, and how Blender is told; what it has no word for stands beside the name.
-UNITS = {"LENGTH": {"unit": "LENGTH"}, "px": {"subtype": "PIXEL"}, "%": {"subtype": "PERCENTAGE"}}
-FILTERS = (
+PREFILTERS = (
     ("NONE", "None", "The guides are as noisy as they are; tolerant, keeps less detail"),
     ("FAST", "Fast", "The guides are taken for clean: keeps most detail, and their noise"),
     ("ACCURATE", "Accurate", "The guides are denoised first: keeps most detail, takes longest"),

@@ -25,6 +25,7 @@ ADVANCED = (
     "alpha",
     "cached_bounces",
     "cached_caustics",
+    "cached_sky",
     "caustic_count",
     "continuation",
     "continuation_constant",

@@ -18,7 +18,7 @@ def picture(engine, folder):
     scene.render.engine = engine
     scene.render.filepath = str(Path(folder) / engine)
     bpy.ops.render.render(write_still=True)
-    image = bpy.data.images.load(scene.render.frame_path())
+    image = bpy.data.images.load(scene.render.filepath + scene.render.file_extension)
     pixels = np.array(image.pixels[:]).reshape(-1, 4)[:, :3]
     bpy.data.images.remove(image)
     return pixels
