@@ -48,7 +48,20 @@ def zig(folder: Path) -> dict[str, str]:
             wrapper.write_text(text)
             wrapper.chmod(0o755)
     # nanobind wants <cstdio>, which libc++ does not bring along.
-    return {variable: str(folder / file) for variable, (file, _) in wrappers.items()} | {"CXXFLAGS": "-include cstdio"}
+    flags = " ".join(["-include cstdio", *debian_headers(folder / "headers")])
+    return {variable: str(folder / file) for variable, (file, _) in wrappers.items()} | {"CXXFLAGS": flags}
+
+
+def debian_headers(folder: Path, system: Path = Path("/usr/include/x86_64-linux-gnu")) -> list[str]:
+    """Flags by which zig finds the headers of Debian's own Pythons: they include a part of them from where only Debian's compilers look.
+    Not all that is there, which is of another libc. Without such Pythons, none."""
+    pythons = sorted(system.glob("python3.*"))
+    for python in pythons:
+        link = folder / system.name / python.name
+        link.parent.mkdir(parents=True, exist_ok=True)
+        link.unlink(missing_ok=True)
+        link.symlink_to(python)
+    return ["-idirafter", str(folder)] if pythons else []
 
 
 def compile_native(source: Path, folder: Path, python: str, compiler: str) -> Path:

@@ -14,7 +14,7 @@ import pytest
 
 from gi_engine import cli
 from gi_engine.arguments import parser
-from gi_engine.package import assemble, wheels
+from gi_engine.package import assemble, build, wheels
 from gi_engine.package.wheels import Name, WheelError
 
 LIBRARY = b"\x7fELF GLIBC_2.2.5\0GLIBC_2.14\0GLIBC_2.28\0GLIBCXX_3.4.30\0"
@@ -87,6 +87,21 @@ def test_a_stable_wheel_serves_no_older_python(tmp_path):
     assert assemble.sorted_pythons(stable, [stable, exact]) == ["cp313", "cp314"]
     assert assemble.not_served([of("cp313.cp314", "none")]) == {"linux-x64": ["cp311"]}
     assert assemble.not_served([of("cp313.cp314", "none"), exact]) == {}
+
+
+def test_zig_finds_the_headers_of_debians_pythons(tmp_path):
+    """/usr/include/python3.11/pyconfig.h includes <x86_64-linux-gnu/python3.11/pyconfig.h>: whether a build failed hung on which Python was found."""
+    system = tmp_path / "x86_64-linux-gnu"
+    (system / "python3.11").mkdir(parents=True)
+    (system / "python3.11" / "pyconfig.h").touch()
+    (system / "features.h").touch()  # of the C library: not to be found
+    for _ in range(2):
+        flag, folder = build.debian_headers(tmp_path / "made", system)
+    assert flag == "-idirafter"
+    found = [str(path.relative_to(folder)) for path in (tmp_path / "made").rglob("*")]
+    assert sorted(found) == ["x86_64-linux-gnu", "x86_64-linux-gnu/python3.11"]
+    assert (tmp_path / "made/x86_64-linux-gnu/python3.11/pyconfig.h").is_file()
+    assert build.debian_headers(tmp_path / "none", tmp_path / "elsewhere") == []
 
 
 def test_wrong_wheels_are_named(tmp_path):
