@@ -15,7 +15,7 @@ from .scene_data import Instance, Program, Scene, Settings
 
 IGNORED = {  # settings that spoil nothing kept
     *("clamp_direct", "min_spacing", "max_spacing", "min_length", "max_length"),
-    *("refinement", "radius", "caustic_count", "global_count"),
+    *("refinement", "radius", "caustic_count", "caustic_filter", "global_count"),
 }
 NEAR = 0.02  # share of what a place sees that something may cover at most, to count as far from it
 MOST_BOXES = 512

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 from light_scenes import lamp, matrix
-from test_closed_forms import BOUNCES, cube, glass, looking, quad, scene_of, sphere, surface
+from test_closed_forms import BOUNCES, cube, glass, looking, quad, scene_of, shiny, sphere, surface
 
 from gi_engine import scene_data as sd
+from gi_engine.nodes.program import ProgramBuilder
 from gi_engine.session import Session
 
 POWERS = slice(7, 10)  # columns of a table of photons
@@ -51,15 +52,72 @@ def test_an_open_scene_holds_what_does_not_escape():
     assert power_of(kept["global"]) == pytest.approx(1.0, rel=0.02)
 
 
-def test_glass_takes_nothing_and_holds_no_photons():
-    """What falls on a clear ball of which the lamp sees the cone of sine 1/2 comes to the box around it, as caustics."""
+@pytest.mark.parametrize("balls", [[(0.3, 1.5)], [(0.3, 1.5), (0.2, 1.33), (0.1, 0.8)]], ids=["one", "nested"])
+def test_glass_takes_nothing_and_holds_no_photons(balls):
+    """What falls on a clear ball of which the lamp sees the cone of sine 1/2 comes to the box around it, as caustics; balls in it, of other
+    indices, change where it goes."""
     light = lamp("POINT", (1.0,) * 3, matrix=matrix((0.6, 0, 0)))
-    scene = scene_of((cube(), surface(0.001)), (sphere(0.3), glass(1.5)), lights=[light])
+    bodies = [(sphere(radius), glass(ior)) for radius, ior in balls]
+    scene = scene_of((cube(), surface(0.001)), *bodies, lights=[light])
     sent = {"global_photons": 100_000, "caustic_photons": 200_000}
     _, kept = render("photon_map", scene, (0, 0, -0.5), (0, 0, -1), 0.1, **sent)
     assert power_of(kept["global"]) == pytest.approx(1.001, rel=0.005)
     assert power_of(kept["caustic"]) == pytest.approx((1 - math.sqrt(3) / 2) / 2, rel=0.02)
     assert (np.abs(kept["caustic"][1:, :3]).max(1) > 0.99).all()
+
+
+def tinted(color):
+    """Clear glass that does not refract."""
+    b = ProgramBuilder()
+    b.op("glass", 1.0, (color,) * 3, 0.0, 1.0, (0, 0, 0), 0.0, 1.33, imm=(0,))
+    return b.finish("tinted")
+
+
+def test_coloured_glass_takes_its_part_at_each_surface():
+    """A ball that does not refract, of colour .5: a quarter of what falls on it is left behind it."""
+    light = lamp("POINT", (1.0,) * 3, matrix=matrix((0.6, 0, 0)))
+    scene = scene_of((cube(), surface(0.001)), (sphere(0.3), tinted(0.5)), lights=[light])
+    _, kept = render("photon_map", scene, (0, 0, -0.5), (0, 0, -1), 0.1, global_photons=1000, caustic_photons=200_000)
+    assert power_of(kept["caustic"]) == pytest.approx((1 - math.sqrt(3) / 2) / 2 / 4, rel=0.02)
+
+
+def test_most_photons_are_sent_to_the_glass():
+    """A small glass ball on a floor that is all in view: light that comes to the floor by itself shows where the view is, no more."""
+    floor = quad((-10, -10, -1), (10, -10, -1), (10, 10, -1), (-10, 10, -1))
+    light = lamp("POINT", (1.0,) * 3, matrix=matrix((0, 0, 8)))
+    scene = scene_of((floor, surface(0.5)), (sphere(0.2, 32), glass(1.5)), lights=[light])
+    _, kept = render("photon_map", scene, (0, 0, 7), (0, 0, -1), 18, global_photons=1000, caustic_photons=200_000)
+    assert len(kept["caustic"]) > 0.5 * 200_000  # by chance 1 of 6400 meets it
+
+
+def test_a_photon_takes_48_bytes_at_most():
+    scene = scene_of((cube(), surface(0.5)), lights=[lamp("POINT", (1.0,) * 3, matrix=matrix())])
+    scene.camera = sd.Camera("camera", "ORTHO", looking((0, 0, 0), (0, 0, -1)), (-0.1, 0.1, -0.1, 0.1), 0.0, 1e6)
+    scene.film = sd.Film(4, 4)
+    photons = {"global_photons": 50_000, "caustic_photons": 10, "global_light": "GATHERED"}
+    with Session(scene, sd.Settings("photon_map", 1, threads=2, parameters={**BOUNCES, **photons})) as session:
+        while not session.wait():
+            pass
+        figures = session.native.figures()
+    assert figures["global photons"] > 50_000
+    assert figures["photon bytes"] <= 48 * figures["global photons"]
+
+
+@pytest.mark.parametrize("filter", ["DISC", "CONE", "GAUSS"])
+def test_filters_keep_the_whole(filter):
+    """The floor beside a mirror: what it throws is as bright by every filter."""
+    floor = quad((0, -8, 0), (16, -8, 0), (16, 8, 0), (0, 8, 0))
+    mirror = quad((0, -16, 0), (0, 16, 0), (0, 16, 16), (0, -16, 16))
+    light = lamp("POINT", (40 * math.pi,) * 3, matrix=matrix((1, 0, 2)))
+    scene = scene_of((floor, surface(1.0)), (mirror, shiny(0.0)), lights=[light])
+    photons = {"caustic_photons": 100_000, "caustic_count": 2000, "global_light": "NONE", "radius": 1000}
+    found = [
+        render("photon_map", scene, (1.5, 0, 1), (0, 0, -1), 0.1, seed=seed, caustic_filter=filter, **photons)[0].mean()
+        for seed in range(1, 7)
+    ]
+    error = np.std(found, ddof=1) / math.sqrt(len(found))
+    assert error < 0.02
+    assert abs(math.pi * np.mean(found) - 2.892147) < 4 * math.pi * error + 0.01
 
 
 def bowl(top):
@@ -115,6 +173,35 @@ def test_the_caustic_of_a_lens_is_that_of_light_tracing():
         found, own = rings(way, 8, **parameters)
         assert truth.max() > 5 * np.median(truth)
         np.testing.assert_array_less(np.abs(found - truth), 5 * np.hypot(error, own) + 0.03 * truth)
+
+
+@pytest.mark.parametrize(
+    ("way", "parameters"),
+    [
+        ("photon_map", {"caustic_photons": 200_000}),
+        ("sppm", {"photons": 100_000, "radius": 1}),
+        ("vcm", {"photons": 100_000, "radius": 1}),
+    ],
+)
+def test_a_caustic_seen_through_glass_is_that_of_long_path_tracing(way, parameters):
+    """A lamp large enough to be met by chance, a glass ball, and a pane on the floor, so that all light there has passed glass twice."""
+    floor = quad((-3, -3, -1), (3, -3, -1), (3, 3, -1), (-3, 3, -1))
+    top = quad((-6, -6, -0.8), (6, -6, -0.8), (6, 6, -0.8), (-6, 6, -0.8))
+    bottom = quad((-6, -6, -0.9), (-6, 6, -0.9), (6, 6, -0.9), (6, -6, -0.9))
+    light = lamp("POINT", (300.0,) * 3, matrix=matrix((0, 0, 2)), radius=0.5)
+    bodies = [(sphere(0.4, 64), glass(1.5)), (top, glass(1.5)), (bottom, glass(1.5))]
+    scene = scene_of((floor, surface(0.5)), *bodies, lights=[light])
+
+    def blocks(integrator, samples, **parameters):
+        view = ((0, 0, -0.7), (0, 0, -1), 1.6)
+        images = [render(integrator, scene, *view, samples, 16, s, **parameters)[0] for s in range(1, 5)]
+        found = np.array([image.reshape(4, 4, 4, 4).mean((1, 3)) for image in images])
+        return found.mean(0), found.std(0, ddof=1) / 2
+
+    truth, error = blocks("path", 4096)
+    assert (error < 0.05 * truth).all()
+    found, own = blocks(way, 16, **parameters)
+    np.testing.assert_array_less(np.abs(found - truth), 5 * np.hypot(error, own) + 0.03 * truth)
 
 
 def test_a_still_caustic_does_not_flicker():

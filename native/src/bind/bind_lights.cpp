@@ -99,10 +99,11 @@ class TestLights {
       const Vec3 o = r->ray.origin, d = r->ray.direction;
       const float values[10] = {o.x, o.y, o.z, d.x, d.y, d.z, r->power.r(), r->power.g(), r->power.b(), float(r->light)};
       std::copy(values, values + 10, row);
-      const auto s = lights_->arriving(*r, {o + d * along, -d, false, {}});
+      const LightQuery query{o + d * along, -d, false, {}};
+      const auto s = lights_->arriving(*r, query);
       if (!s) continue;
       const Rgb power = s->radiance / lights_->pdf_emit(r->light, o + d * along, -d);
-      row[10] = power.r(), row[11] = power.g(), row[12] = power.b(), row[13] = s->pdf_dir;
+      row[10] = power.r(), row[11] = power.g(), row[12] = power.b(), row[13] = s->pdf_dir * lights_->pick_probability(query, r->light);
     }
     return out;
   }

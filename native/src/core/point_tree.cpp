@@ -1,9 +1,45 @@
 // Building: each node parts its points at the median of their longest axis.
 #include "core/point_tree.h"
 
+#include <algorithm>
 #include <atomic>
+#include <bit>
 
 namespace gi {
+namespace {
+
+// Orders items along an axis; those at equal places by their index, so that no two are equal.
+template <int kAxis, class Item>
+uint64_t key(const Item& item) {
+  const uint32_t bits = std::bit_cast<uint32_t>(item.point[kAxis]);
+  const uint32_t ordered = bits ^ (bits >> 31 ? 0xffffffffu : 0x80000000u);
+  return uint64_t(ordered) << 32 | item.index;
+}
+
+// As std::nth_element. Pivots are those of a sample that should lie where `middle` does [Floyd & Rivest 1975, "Expected time bounds for
+// selection"], and items change sides without a branch, which would be guessed wrong every other time.
+template <int kAxis, class Item>
+void select(Item* first, Item* middle, Item* last) {
+  constexpr size_t kSample = 16, kFew = 64;
+  constexpr int kTries = 16;
+  for (int i = 0; i < kTries && size_t(last - first) > kFew; ++i) {
+    const size_t n = size_t(last - first), rank = std::max<size_t>(size_t(middle - first) * kSample / n, 1);
+    uint64_t sample[kSample];
+    for (size_t k = 0; k < kSample; ++k) sample[k] = key<kAxis>(first[(2 * k + 1) * n / (2 * kSample)]);
+    std::nth_element(sample, sample + rank, sample + kSample);
+    const uint64_t pivot = sample[rank];
+    Item* border = first;
+    for (Item* item = first; item < last; ++item) {
+      const Item moved = *item;
+      *item = *border, *border = moved;
+      border += key<kAxis>(moved) < pivot;
+    }
+    (middle < border ? last : first) = border;
+  }
+  std::nth_element(first, middle, last, [](const Item& a, const Item& b) { return key<kAxis>(a) < key<kAxis>(b); });
+}
+
+}  // namespace
 
 PointTree::PointTree(const std::vector<Vec3>& points, ThreadPool& pool) {
   const size_t n = points.size();
@@ -38,10 +74,9 @@ void PointTree::split(std::vector<Item>& items, size_t node, Range range) {
   for (size_t i = range.begin; i < range.end; ++i) low = min(low, items[i].point), high = max(high, items[i].point);
   const Vec3 extent = high - low;
   const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
-  const auto middle = items.begin() + ptrdiff_t(range.high().begin);
-  std::nth_element(
-      items.begin() + ptrdiff_t(range.begin), middle, items.begin() + ptrdiff_t(range.end),
-      [axis](const Item& a, const Item& b) { return a.point[axis] != b.point[axis] ? a.point[axis] < b.point[axis] : a.index < b.index; });
+  Item *all = items.data(), *middle = all + range.high().begin;
+  constexpr decltype(&select<0, Item>) kSelect[] = {select<0, Item>, select<1, Item>, select<2, Item>};
+  kSelect[axis](all + range.begin, middle, all + range.end);
   nodes_[node] = {middle->point[axis], uint32_t(axis)};
 }
 

@@ -110,6 +110,7 @@ class PhotonMapIntegrator final : public Integrator {
         caustic_photons_(p.integer("caustic_photons")),
         global_count_(size_t(p.integer("global_count"))),
         caustic_count_(size_t(p.integer("caustic_count"))),
+        filter_(PhotonFilter(p.integer("caustic_filter"))),
         radius_(p.real("radius")),
         goal_(0.01 * p.number("photon_error")),
         most_bytes_(size_t(p.integer("photon_memory")) << 20),
@@ -215,7 +216,7 @@ class PhotonMapIntegrator final : public Integrator {
     if (kept_caustic_.paths == 0.0) {
       const FilmSpec& spec = film.spec();
       SubpathSettings light;
-      light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height};
+      light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height}, light.weighs = false;
       const uint8_t all = gathers() ? kAllPhotons : kGlobalPhoton;
       if (way_ != GlobalLight::kNone) global_ = send(context, light, kGlobal, global_photons_, global_count_, all, seen_global);
       light.only_by_mirrors = true;
@@ -256,6 +257,7 @@ class PhotonMapIntegrator final : public Integrator {
     int batches = 0;
     do {
       const auto more = trace_photons(context, light, batches, batch, classes);
+      if (batches == 0) photons.reserve(size_t(1.02 * kBatches * double(more.size())));  // about as many as there will be
       photons.insert(photons.end(), more.begin(), more.end());
     } while (++batches * batch < paths && !context.cancelled && !is_late(context, began));
     if (batches * batch < paths && !context.cancelled)
@@ -316,7 +318,7 @@ class PhotonMapIntegrator final : public Integrator {
   }
 
   Rgb caustics(const ShadingPoint& point, const Bsdf& bsdf) const {
-    return caustic_.map.radiance(point, bsdf, radius_ * point.footprint, caustic_.count);
+    return caustic_.map.radiance(point, bsdf, radius_ * point.footprint, caustic_.count, filter_);
   }
 
   // What the diffuse lobes make of irradiance(normal of the side), as if it came from everywhere alike; nothing where that is not known.
@@ -335,6 +337,7 @@ class PhotonMapIntegrator final : public Integrator {
 
   int global_photons_, caustic_photons_;
   size_t global_count_, caustic_count_;
+  PhotonFilter filter_;
   float radius_;
   double goal_;  // relative error; 0: none
   size_t most_bytes_;
@@ -390,6 +393,17 @@ const Descriptor& photon_map_descriptor() {
            "Photons by which the light of a place is estimated: more are smoother, and blur it"},
           {"caustic_count", "Caustic Neighbours", Kind::kInt, 60, 2, 10000,
            "Photons by which a caustic is estimated: more are smoother, and blur it"},
+          {"caustic_filter",
+           "Caustic Filter",
+           Kind::kChoice,
+           1,
+           0,
+           2,
+           "What photons count by their distance where a caustic is estimated",
+           "",
+           {{"DISC", "None", "All alike: least noise, most blur"},
+            {"CONE", "Cone", "Less towards the border: sharper"},
+            {"GAUSS", "Gaussian", "Between the two"}}},
           {"radius", "Caustic Radius", Kind::kFloat, 12, 0.1, 1000,
            "Farther away photons are not looked for: less keeps caustics from being blurred where photons are few", "px"},
           {"photon_error", "Photon Error", Kind::kFloat, 0, 0, 100,

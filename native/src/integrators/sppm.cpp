@@ -19,7 +19,7 @@ class SppmIntegrator final : public Integrator {
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     const FilmSpec& spec = film.spec();
     SubpathSettings light;
-    light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height};
+    light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height}, light.weighs = false;
     if (guide_is_old_) {
       guide_ = learn_emission(context, light, photons_, kCausticPhoton | kGlobalPhoton,
                               find_ends(context, film, s_.limits, false, kLooksAcross));

@@ -90,11 +90,9 @@ float LightSet::emitted_power() const { return float(impl_->emitters.total()); }
 std::optional<LightSample> LightSet::arriving(const EmittedRay& emitted, const LightQuery& query) const {
   const Impl& impl = *impl_;
   const Vec3 wi = -emitted.ray.direction;
-  auto s = emitted.light < impl.first_triangle() ? impl.arriving_lamp(emitted, query)
-           : emitted.light < impl.world_light()  ? impl.arriving_triangle(emitted, query)
-                                                 : std::optional(impl.world_sample(query, wi, impl.world.pdf_dir(query, wi)));
-  if (s) s->pdf_dir *= impl.pick_probability(query, emitted.light);
-  return s;
+  return emitted.light < impl.first_triangle() ? impl.arriving_lamp(emitted, query)
+         : emitted.light < impl.world_light()  ? impl.arriving_triangle(emitted, query)
+                                               : std::optional(impl.world_sample(query, wi, impl.world.pdf_dir(query, wi)));
 }
 
 float LightSet::pdf_emit(uint32_t light, Vec3 position, Vec3 wi) const {

@@ -84,8 +84,8 @@ class LightSet {
   std::optional<EmittedRay> emit(float u_choice, Vec2 u_place, Vec2 u_direction) const;
   // Whether light that was emitted like this is what `position` sees: Blender's lamps of soft falloff turn to whoever looks.
   bool turns_to(const EmittedRay& emitted, Vec3 position) const;
-  // What `sample` would have said at `query` of light that was emitted like this and arrived there; none where that point does not
-  // see it (lamps of soft falloff turn to whoever looks).
+  // What `sample` would have said at `query` of light that was emitted like this and arrived there, its choice of this light left out;
+  // none where that point does not see it (lamps of soft falloff turn to whoever looks).
   std::optional<LightSample> arriving(const EmittedRay& emitted, const LightQuery& query) const;
   // Density with which `emit` makes the ray from `light` that arrives at `position` from `wi`: per steradian and square metre across
   // the ray, choice included. Where place or direction is fixed (delta lights) it is left out, and what remains is as seen from

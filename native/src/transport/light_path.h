@@ -61,6 +61,7 @@ class EmissionLearner {
   explicit EmissionLearner(float even = EmissionGuide::kEven) : even_(even) {}
   const EmissionGuide& guide() const { return guide_; }
   size_t size() const { return trials_.size(); }  // paths that brought something
+  void forget() { trials_.clear(); }              // but not what has been learnt from them, by which the next are sent
 
   // One more round, of about `count` paths; worth(vertices, sampler) says what each brings.
   template <class Worth>

@@ -1,6 +1,8 @@
 // Photons: sent out, stored, and looked up.
 #include "transport/photon_map.h"
 
+#include <atomic>
+
 #include "transport/diffuse_end.h"
 
 namespace gi {
@@ -41,6 +43,18 @@ bool is_even(const std::vector<Vec2>& points, float radius_squared) {
   for (const Vec2 p : points) mean.x += p.x, mean.y += p.y, xx += p.x * p.x, xy += p.x * p.y, yy += p.y * p.y;
   const float n = float(points.size()), least = 0.5f * (xx + yy - std::hypot(xx - yy, 2.0f * xy));
   return sqr(mean.x) + sqr(mean.y) < sqr(kShift * n) * radius_squared && least > kSpread * n * radius_squared;
+}
+
+// Of a photon at a squared distance, that of the border being 1; on average over the disc 1. [Jensen 2001, eq. 7.8 and 7.9; the latter's
+// scale is here what makes the average 1]
+float weight_of(PhotonFilter filter, float distance_squared) {
+  constexpr float kBeta = 1.953f, kGaussScale = 1.728309f;
+  switch (filter) {
+    case PhotonFilter::kDisc: return 1.0f;
+    case PhotonFilter::kCone: return 3.0f * (1.0f - std::sqrt(distance_squared));
+    case PhotonFilter::kGauss: break;
+  }
+  return kGaussScale * (1.0f - (1.0f - std::exp(-0.5f * kBeta * distance_squared)) / (1.0f - std::exp(-kBeta)));
 }
 
 }  // namespace
@@ -119,25 +133,35 @@ SeenPoints seen_points(const std::vector<PathEnd>& ends, ThreadPool& pool) {
 
 EmissionGuide learn_emission(const RenderContext& context, const SubpathSettings& settings, int photons, uint8_t classes,
                              const std::vector<PathEnd>& ends) {
-  constexpr size_t kEnough = 30000;  // paths that brought something
+  constexpr size_t kEnough = 30000, kFew = 300;  // paths that brought something
   constexpr double kTimeShare = 0.05;  // of a time limit
   constexpr float kOnTheWay = 0.05f;  // what light of other classes is worth, which at least comes near what is seen
-  constexpr int kMostRounds = 16;
+  constexpr int kMostRounds = 16, kFirstRound = 5000;  // each round is twice the one before, up to an eighth of the photons
   const SeenPoints seen = seen_points(ends, context.pool);
   EmissionLearner learner;
+  // Once there is some of the wished light, the other kind does not count any longer: of a glass on a wide floor that would be nearly all.
+  std::atomic<size_t> arrived = 0;  // paths that brought wished light
+  bool shows_way = true;
   const double began = context.seconds();
   for (int round = 0; round < kMostRounds && !context.cancelled; ++round) {
-    if (round >= EmissionLearner::kFirstRounds && learner.size() > kEnough) break;
+    if (round >= EmissionLearner::kFirstRounds && learner.size() > kEnough && !shows_way) break;
     if (context.time_limit > 0.0 && context.seconds() - began > kTimeShare * context.time_limit) break;
-    learner.learn(context, settings, photons / 8, [&](const LightVertices& path, Sampler&) {
-      float worth = 0.0f;
+    learner.learn(context, settings, std::min(photons / 8, kFirstRound << round), [&](const LightVertices& path, Sampler&) {
+      float wished = 0.0f, other = 0.0f;
       for (int i = 0; i < int(path.count()); ++i) {
         const LightVertex& v = path[size_t(i)];
-        const float all = average(power_of(v, settings, kAllPhotons)), wished = average(power_of(v, settings, classes));
-        if (all > 0.0f) worth += (wished + kOnTheWay * (all - wished)) * seen.density(v.point.position);
+        const float all = average(power_of(v, settings, kAllPhotons)), part = average(power_of(v, settings, classes));
+        if (!(all > 0.0f)) continue;
+        const float density = seen.density(v.point.position);
+        wished += part * density, other += (all - part) * density;
       }
-      return worth;
+      if (wished > 0.0f) ++arrived;
+      return wished + (shows_way ? kOnTheWay * other : 0.0f);
     });
+    if (shows_way && arrived > kFew) {
+      shows_way = false;
+      if (arrived < learner.size()) learner.forget();
+    }
   }
   return learner.guide();
 }
@@ -240,20 +264,19 @@ Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radiu
   return sum * (scale_ / (kPi * sqr(radius)));
 }
 
-Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count) const {
+Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count, PhotonFilter filter) const {
   static thread_local std::vector<PointTree::Found> found;
   tree_.nearest(point.position, count, sqr(radius), found, [&](uint32_t k) { return is_of(k, point.position, point.ng, radius); });
-  if (found.empty()) return Rgb();
-  // With fewer than `count`, the cone reaches as far as was looked.
-  float end = radius;
+  // The last of `count` marks the border, and is not in it; with fewer, the disc reaches as far as was looked.
+  float end = sqr(radius);
   if (found.size() == count) {
     end = 0.0f;
     for (const auto& f : found) end = std::max(end, f.distance_squared);
-    end = std::sqrt(end);
   }
   Rgb sum;
-  for (const auto& f : found) sum += scattered(point, bsdf, lights_[f.point]) * (1.0f - std::sqrt(f.distance_squared) / end);
-  return sum * (3.0f * scale_ / (kPi * sqr(end)));
+  for (const auto& f : found)
+    if (f.distance_squared < end) sum += scattered(point, bsdf, lights_[f.point]) * weight_of(filter, f.distance_squared / end);
+  return end > 0.0f ? sum * (scale_ / (kPi * end)) : Rgb();
 }
 
 const std::vector<PointTree::Found>& PhotonMap::around(Vec3 position, Vec3 normal, float radius, size_t count, const PathState& eye) const {

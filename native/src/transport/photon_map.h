@@ -82,6 +82,9 @@ struct PhotonError {
   double total() const { return std::hypot(noise, blur); }
 };
 
+// How photons are weighed by their distance from the middle of a disc: all alike, by a cone, or by a bell that is cut off.
+enum class PhotonFilter { kDisc, kCone, kGauss };
+
 // Photons that can be looked up. Those of other surfaces are refused: of another slope, or off the plane of the point.
 class PhotonMap {
  public:
@@ -96,8 +99,8 @@ class PhotonMap {
 
   // Radiance towards point.wo of the diffuse lobes, by all photons nearer than `radius`: Σ f Φ / π r². [Jensen 2001, eq. 7.6]
   Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius) const;
-  // By the nearest `count` of those within `radius`, weighed by a cone that ends at the farthest. [Jensen 2001, eq. 7.8]
-  Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count) const;
+  // By the nearest `count` of those within `radius`, in a disc that ends at the farthest.
+  Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count, PhotonFilter filter) const;
   // Power per area on the side of `normal`, by the nearest `count` within `radius` of those that reach `eye`; `farthest`: how far these
   // are.
   Rgb irradiance(Vec3 position, Vec3 normal, float radius, size_t count, const PathState& eye, const Scene* scene,

@@ -120,14 +120,18 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     v.max_bounces = carried.max_bounces;
     if (!(cos_in > 0.0f)) return;
     if (v.is_first()) {
-      const auto light = context.lights.arriving(*emitted, light_query(v.point, v.bsdf));
+      const LightQuery query = light_query(v.point, v.bsdf);
+      const auto light = context.lights.arriving(*emitted, query);
       const float pdf_emit = context.lights.pdf_emit(emitted->light, v.point.position, v.point.wo);
       if (!light || !(pdf_emit > 0.0f)) return;
-      // Densities of one path's two ends as sampled directly and by itself. [Georgiev 2012, eq. 31, 32 and 48 to 52, here per steradian and
-      // area at this vertex, which serves lights near and far alike]
-      const float pdf_joined = pdf_emit * cos_in * settings.joined;
-      v.weights.vcm = h(light->pdf_dir / pdf_joined);
-      v.weights.vc = light->is_delta || !light->use_mis ? 0.0f : h(1.0f / pdf_joined);
+      v.weights = PartialWeights();
+      if (settings.weighs) {
+        // Densities of one path's two ends as sampled directly and by itself. [Georgiev 2012, eq. 31, 32 and 48 to 52, here per steradian and
+        // area at this vertex, which serves lights near and far alike]
+        const float pdf_joined = pdf_emit * cos_in * settings.joined;
+        v.weights.vcm = h(light->pdf_dir * context.lights.pick_probability(query, emitted->light) / pdf_joined);
+        v.weights.vc = light->is_delta || !light->use_mis ? 0.0f : h(1.0f / pdf_joined);
+      }
       v.power = light->radiance * passed * (weight / pdf_emit);
       v.seen_by = light->visibility;
     } else {
