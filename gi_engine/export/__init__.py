@@ -27,6 +27,7 @@ from .world import export_world
 WITHOUT = {
     "subsurface": "does not follow light below surfaces: subsurface scattering is diffuse of the same albedo",
     "volumes": "does not render volumes: they are left out",
+    "portals": "sends no light through ray portals: they only show what lies behind them",
 }
 
 

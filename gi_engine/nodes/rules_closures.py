@@ -1,12 +1,11 @@
 """Rules of the shader nodes: what they add to the surface, as closure ops. No bpy.
 
-Normal and Coat Normal that are not linked are the zero vector, which the ops take for the shading normal. What is not
-rendered (hair, ray portals) has its fallback and warning here.
+Normal and Coat Normal that are not linked are the zero vector, which the ops take for the shading normal.
 """
 
 from __future__ import annotations
 
-from .program import COLOR, Value
+from .program import Value
 from .rules import closure_rule
 from .rules_input import radial_tangent
 
@@ -269,28 +268,52 @@ def subsurface(b, weight):
     b.op("subsurface", weight, *inputs, *entry, normal(b), imm=(subsurface_method(b, "falloff"),))
 
 
-# -------------------------------------------------------------------- fallbacks
+# -------------------------------------------------------------------- hair
 
 
 @closure_rule("ShaderNodeBsdfHair")
 def hair(b, weight):
-    op = "translucent" if b.node.component == "Transmission" else "diffuse"
-    b.warn(f"hair scattering is not rendered yet; it is {op} of the same colour")
-    inputs = (b.input("Color"), NONE) if op == "translucent" else (b.input("Color"), 0.0, NONE)
-    b.op(op, weight, *inputs)
+    along, across, is_strand, _ = b.op("strand")
+    b.op(
+        "hair_strand", weight, b.input("Color"), b.input("RoughnessU"), b.input("RoughnessV"), b.input("Offset"),
+        b.linked_or("Tangent", NONE), along, across, is_strand, imm=(b.node.component == "Transmission",),
+    )  # fmt: skip
 
 
 @closure_rule("ShaderNodeBsdfHairPrincipled")
 def principled_hair(b, weight):
-    b.warn("hair scattering is not rendered yet; it is diffuse of the hair's colour")
-    color = b.input("Color") if b.node.parametrization == "COLOR" else b.constant(0.3, 0.2, 0.1, kind=COLOR)
-    b.op("diffuse", weight, color, 0.0, NONE)
+    along, _, _, met = b.op("strand")
+    random, uneven = b.input("Random"), b.input("Random Roughness")
+    roughness, huang = b.op("vary", b.input("Roughness"), random, uneven), b.node.model == "HUANG"
+    radial = roughness if huang else b.op("vary", b.input("Radial Roughness"), random, uneven)
+    absorption = hair_absorption(b, random, radial)
+    offset, ior = b.input("Offset"), b.input("IOR")
+    if huang:
+        parts = [b.input(name) for name in ("R lobe", "TT lobe", "TRT lobe")]
+        b.op("hair_huang", weight, absorption, roughness, offset, ior, b.input("Aspect Ratio"), *parts, along)
+    else:
+        b.op("hair_chiang", weight, absorption, roughness, radial, b.input("Coat"), offset, ior, along, met)
+
+
+def hair_absorption(b, random, radial):
+    if b.node.parametrization == "ABSORPTION":
+        return b.input("Absorption Coefficient")
+    if b.node.parametrization == "COLOR":
+        return b.op("absorption_of_color", b.input("Color"), radial)
+    melanin = b.op("vary", b.input("Melanin"), random, b.op("saturate", b.input("Random Color")))
+    pigments = b.op("absorption_of_melanin", melanin, b.input("Melanin Redness"))
+    return b.op("vector_add", pigments, b.op("absorption_of_color", b.input("Tint"), radial))
+
+
+# -------------------------------------------------------------------- portals, and what is for other engines
 
 
 @closure_rule("ShaderNodeBsdfRayPortal")
 def ray_portal(b, weight):
-    b.warn("ray portals are not rendered yet; light goes straight on")
-    b.op("transparent", weight, b.input("Color"))
+    color, elsewhere = b.input("Color"), b.linked("Position")
+    if not is_zero(b, color):
+        b.need("portals")
+        b.op("ray_portal", weight, color, b.linked_or("Position", NONE), b.input("Direction"), imm=(elsewhere,))
 
 
 @closure_rule("ShaderNodeEeveeSpecular")

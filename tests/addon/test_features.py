@@ -38,6 +38,21 @@ def test_integrators_say_what_they_do_not_carry(skin):
     assert '"Skin"' in warning
 
 
+def test_integrators_say_that_they_send_no_light_through_portals(skin):
+    tree = skin.node_tree
+    portal = tree.nodes.new("ShaderNodeBsdfRayPortal")
+    tree.links.new(portal.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    for integrator, told in (
+        ("path", 0),
+        ("whitted", 0),
+        ("bdpt", 0),
+        ("light", 1),
+        ("photon_map", 1),
+        ("particle", 1),
+    ):
+        assert len([text for text in exported(integrator).warnings if "portals" in text]) == told
+
+
 def test_integrators_say_which_caustics_they_cannot_switch_off(skin):
     def told(integrator):
         return [text for text in exported(integrator).warnings if "caustics" in text]
@@ -53,11 +68,12 @@ def test_integrators_say_which_caustics_they_cannot_switch_off(skin):
 
 def test_approximated_nodes_are_counted(skin):
     tree = skin.node_tree
-    hair = tree.nodes.new("ShaderNodeBsdfRayPortal")
-    tree.links.new(hair.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    below = tree.nodes.new("ShaderNodeSubsurfaceScattering")
+    below.falloff = "BURLEY"
+    tree.links.new(below.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
     found = exported("path")
     assert approximated(found.scene) == ['"Skin": 1 node approximated']
-    assert len(approximations.of("Skin")) == 1 and "Ray Portal" in approximations.of("Skin")[0]
+    assert len(approximations.of("Skin")) == 1 and "Burley" in approximations.of("Skin")[0]
     tree.links.new(tree.nodes["Principled BSDF"].outputs[0], tree.nodes["Material Output"].inputs["Surface"])
     exported("path")
     assert not approximations.of("Skin")

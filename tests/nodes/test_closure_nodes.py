@@ -185,9 +185,6 @@ def test_groups_and_muted_shaders(shader):
 @pytest.mark.parametrize(
     ("idname", "ops"),
     [
-        ("ShaderNodeBsdfHair", ["diffuse"]),
-        ("ShaderNodeBsdfHairPrincipled", ["diffuse"]),
-        ("ShaderNodeBsdfRayPortal", ["transparent"]),
         ("ShaderNodeVolumeScatter", []),
     ],
 )

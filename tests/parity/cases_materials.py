@@ -14,6 +14,7 @@ from .studio import (
     node,
     ortho_from_above,
     output,
+    put,
     sheet,
     square,
     tree_of,
@@ -186,6 +187,48 @@ def skin_and_marble(scene):
     camera((0, -4, 1.5), (0, 0, 0.4), 40.0)
 
 
+def portal(name, beside=(0.0, 0.0, 0.0), direction=None, color=(0.9, 0.8, 0.7), rest=0.0):
+    """Leads `beside` the place where it is met, and on in a direction of its own. `rest`: the share that is diffuse. Not transparent:
+    what is both passes shadow rays in Cycles, which then counts lamps behind it twice."""
+    from bpy import data
+
+    made = data.materials.new(name)
+    tree = tree_of(made)
+    shader = node(tree, "ShaderNodeBsdfRayPortal", None, {"Color": color})
+    if any(beside):
+        place = node(tree, "ShaderNodeNewGeometry").outputs["Position"]
+        put(tree, shader.inputs["Position"], node(tree, "ShaderNodeVectorMath", None, {0: place, 1: beside}).outputs[0])
+    if direction:
+        put(
+            tree,
+            shader.inputs["Direction"],
+            node(tree, "ShaderNodeCombineXYZ", None, dict(enumerate(direction))).outputs[0],
+        )
+    if rest:
+        diffuse = node(tree, "ShaderNodeBsdfDiffuse", None, {"Color": (0.5, 0.9, 0.6)})
+        both = node(tree, "ShaderNodeMixShader", None, {0: rest})
+        tree.links.new(shader.outputs[0], both.inputs[1])
+        tree.links.new(diffuse.outputs[0], both.inputs[2])
+        shader = both
+    output(tree, shader)
+    return made
+
+
+def portals(scene):
+    """Ray portals that show another place, turn the way, mix with what is diffuse, and bring light from a far lamp."""
+    square(material("floor", "ShaderNodeBsdfDiffuse", Color=(0.7, 0.7, 0.7)), 3.0)
+    ball(principled()("red"), 0.4, location=(1.2, 0.3, 0.4))
+    upright = (math.pi / 2, 0.0, 0.0)
+    square(portal("door", (2.4, 0.0, 0.0)), 0.4, location=(-1.2, -0.4, 0.4), rotation=upright)
+    square(portal("turned", direction=(0.5, 0.6, -0.4)), 0.3, location=(-0.1, -0.7, 0.4), rotation=upright)
+    square(portal("mixed", (0.0, 0.0, 2.0), rest=0.4), 0.3, location=(0.3, -0.7, 1.1), rotation=upright)
+    square(portal("shaft", (0.0, 0.0, 40.0)), 0.4, location=(0.0, 1.0, 0.5), rotation=(0.6, 0.0, 0.0))
+    square(material("far", "ShaderNodeEmission", Color=BRASS, Strength=8.0), 4.0, location=(0.0, 1.0, 42.0))
+    world(SKY, 0.3)
+    lamp("AREA", (1.0, -1.5, 3.0), (0.3, 0.3, 0.0), 60.0, shape="SQUARE", size=1.0, color=LAMP)
+    camera((0, -5, 2.0), (0, 0, 0.5), 34.0)
+
+
 def no_material(scene):
     ball(None, 0.42, rings=32)
     light()
@@ -200,6 +243,7 @@ CASES = [
     Case("fog", fog, samples=128, cycles={"volume_bounces": 0}),
     Case("fog, scattered often", fog, samples=128, cycles={"volume_bounces": 4}),
     Case("light below surfaces", skin_and_marble, samples=128),
+    Case("ray portals", portals, samples=128),
     Case("filter glossy, little", glossy_room, samples=128, cycles={"blur_glossy": 0.1}),
     Case("filter glossy, as new files", glossy_room, samples=128, cycles={"blur_glossy": 1.0}),
 ]

@@ -77,6 +77,14 @@ Lobe make_lobe(const std::string& name, const Parameters& p) {
   if (name == "sheen") return Sheen(p.f("roughness", 0.5f), p.f("cos_o", 1.0f));
   if (name == "velvet") return Velvet(p.f("sigma", 0.5f));
   if (name == "toon") return Toon(p.f("size", 0.5f), p.f("smooth", 0.0f), p.f("glossy", 0.0f) != 0.0f);
+  if (name.starts_with("hair_strand"))
+    return HairStrand::make({1, 0, 0}, p.f("along", 0.1f), p.f("around", 0.3f), p.f("offset", 0.0f), name == "hair_strand_through");
+  if (name == "hair_chiang")
+    return HairChiang::make(p.c("sigma", Rgb()), p.f("along", 0.3f), p.f("around", 0.3f), p.f("coat", 0.0f), p.f("offset", 0.035f),
+                            p.f("ior", 1.55f), p.f("h", 0.0f));
+  if (name == "hair_huang")
+    return HairHuang::make({p.c("sigma", Rgb()), p.f("roughness", 0.3f), p.f("offset", 0.035f), p.f("ior", 1.55f), p.f("aspect", 1.0f),
+                            p.f("r", 1.0f), p.f("tt", 1.0f), p.f("trt", 1.0f)});
   if (name == "ashikhmin_shirley") return AshikhminShirley::make(p.f("alpha_x", 0.25f), p.f("alpha_y", 0.25f));
   throw InputError("unknown lobe: " + name);
 }

@@ -145,6 +145,7 @@ nb::list describe_integrators() {
     nb::list carries;
     if (d.carries & kCarriesSubsurface) carries.append("subsurface");
     if (d.carries & kCarriesVolumes) carries.append("volumes");
+    if (d.carries & kCarriesPortals) carries.append("portals");
     entry["carries"] = carries;
     all.append(entry);
   }

@@ -211,6 +211,7 @@ class BdptIntegrator final : public Integrator {
     PartialWeights weights;  // of the ray that leaves the vertex before
     bool may_scatter = true, meets = true;
     float travelled = 0;  // since the vertex before
+    bool behind_portal = false;  // since the vertex before
 
     const auto add = [&](Rgb radiance, int depth) {
       if (!is_black(radiance))
@@ -254,6 +255,7 @@ class BdptIntegrator final : public Integrator {
       if (path.state.depth == 0)
         here.weights = {h(light_count / (s_.joined * lens_density(context.camera, camera.ray, segment) * pixels * cos_in)),
                         0.0f};  // [eq. 45]
+      if (behind_portal) here.weights = {};  // light does not find the way back
 
       const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
       const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
@@ -281,10 +283,10 @@ class BdptIntegrator final : public Integrator {
       if (is_black(path.throughput)) break;
       if (transparent) {
         if (!advance(path.state, next->flags, s_.limits)) break;
-        const float left = path.ray.t_max - hit->t;
         travelled = segment;
-        path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, left};
-        path.origin.query.path = path.state;
+        path.pass(point, bsdf, *next, hit->t);
+        behind_portal |= (next->flags & kPortal) != 0;
+        if (behind_portal) weights = {};
         continue;
       }
 
@@ -293,7 +295,7 @@ class BdptIntegrator final : public Integrator {
       const float pdf_reverse = is_delta || here.weights.vc == 0.0f ? 0.0f : reverse(context, here, next->wi).pdf_dir;
       weights = here.weights.scattered(h, is_delta, abs_dot(point.ng, next->wi), next->pdf_dir, pdf_reverse, here.merged);
       meets = meets_light(context.scene, point);
-      travelled = 0;
+      travelled = 0, behind_portal = false;
       may_scatter = advance(path.state, next->flags, s_.limits);
       const FilmSpec& spec = film.spec();
       const bool through_glass = spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness;
@@ -520,7 +522,11 @@ const Descriptor& bdpt_descriptor() {
       }),
       [](const Parameters& p) -> std::unique_ptr<Integrator> {
         return std::make_unique<BdptIntegrator>(p, Strategies{p.integer("only_s"), p.integer("only_t"), p.on("weighted")}, Merging{});
-      }};
+      },
+      /*bakes=*/false,
+      /*kept_version=*/0,
+      /*kept_by_place=*/false,
+      kCarriesPortals};
   return descriptor;
 }
 
@@ -541,7 +547,7 @@ const Descriptor& vcm_descriptor() {
            "",
            {{"ALL", "All", "Vertices are connected and merged"},
             {"CONNECT", "Connection", "Bidirectional path tracing alone"},
-            {"MERGE", "Merging", "Progressive photon mapping alone; lights come to diffuse and glossy surfaces as photons only"}}},
+            {"MERGE", "Merging", "Progressive photon mapping alone; lights come to diffuse and glossy surfaces as photons only, which ray portals stop"}}},
           {"photons", "Photons", Kind::kInt, 1000000, 1, 1e9,
            "Most light paths that are sent out in each pass for merging, no more than pixels: more make caustics seen in glass smooth "
            "sooner"},
@@ -554,7 +560,11 @@ const Descriptor& vcm_descriptor() {
         const int terms = p.integer("terms");
         const Merging merging{terms == 1 ? 0 : p.integer("photons"), p.real("radius"), p.number("alpha"), terms == 2};
         return std::make_unique<BdptIntegrator>(p, Strategies{-1, -1, true}, merging);
-      }};
+      },
+      /*bakes=*/false,
+      /*kept_version=*/0,
+      /*kept_by_place=*/false,
+      kCarriesPortals};
   return descriptor;
 }
 

@@ -48,16 +48,16 @@ class DistributedIntegrator final : public Integrator {
       if (!next || !(next->pdf_dir > 0.0f)) break;
       path.throughput *= next->value / next->pdf_dir;
       if (is_black(path.throughput)) break;
-      path.travelled += hit->t;
-      path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
       const bool within = advance(path.state, next->flags, limits_);
       if (next->flags & kTransparent) {
         if (!within) break;
-        path.origin.query.path = path.state;
-      } else {
-        path.seen_from_camera = false;
-        path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : next->pdf_dir};
+        path.pass(point, bsdf, *next, hit->t);
+        continue;
       }
+      path.travelled += hit->t;
+      path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+      path.seen_from_camera = false;
+      path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : next->pdf_dir};
       if (next->flags & kDiffuse) {
         result.radiance += path.throughput * direct_only(context, path);
         break;
@@ -93,7 +93,11 @@ const Descriptor& distributed_descriptor() {
           {"transmission_bounces", "Transmission", Kind::kInt, 12, 0, 1024, "Refractions"},
           {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
       },
-      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<DistributedIntegrator>(p); }};
+      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<DistributedIntegrator>(p); },
+      /*bakes=*/false,
+      /*kept_version=*/0,
+      /*kept_by_place=*/false,
+      kCarriesPortals};
   return descriptor;
 }
 

@@ -60,7 +60,7 @@ class Integrator {
 };
 
 // What paths may meet besides surfaces that scatter where they are met. Of the rest an integrator makes the surface's own fallback.
-enum Carries : uint8_t { kCarriesSubsurface = 1, kCarriesVolumes = 2 };
+enum Carries : uint8_t { kCarriesSubsurface = 1, kCarriesVolumes = 2, kCarriesPortals = 4 };
 
 struct Descriptor {
   const char* id;

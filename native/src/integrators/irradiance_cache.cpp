@@ -157,15 +157,14 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     if (!next || !(next->pdf_dir > 0.0f)) break;
     const bool transparent = next->flags & kTransparent;
     if (!may_scatter && !transparent) break;
-    path.travelled += hit->t;
     if (transparent) {
       const Rgb weight = next->value / next->pdf_dir;
       path.throughput *= weight, walk.to_luminaires *= weight, walk.to_known_sky *= weight, walk.to_excess *= weight;
       if (!advance(path.state, next->flags, limits_)) break;
-      path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, path.ray.t_max - hit->t};
-      path.origin.query.path = path.state;
+      path.pass(point, bsdf, *next, hit->t);
       continue;
     }
+    path.travelled += hit->t;
 
     // Follow it: to luminaires by all lobes, to all else by those that are not in the cache.
     const bool delta = next->flags & kSpecular;
@@ -252,7 +251,8 @@ const Descriptor& irradiance_cache_descriptor() {
       [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<IrradianceCacheIntegrator>(p); },
       /*bakes=*/false,
       /*kept_version=*/4,
-      /*kept_by_place=*/true};
+      /*kept_by_place=*/true,
+      kCarriesPortals};
   return descriptor;
 }
 

@@ -48,9 +48,7 @@ class LightIntegrator final : public Integrator {
       const auto next = bsdf.sample(point.wo, sampler.next_2d(), sampler.next_1d());
       if (!next || !(next->flags & kTransparent) || !advance(path.state, next->flags, s_.limits)) return;
       path.throughput *= next->value / next->pdf_dir;
-      path.travelled += hit->t;
-      path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, path.ray.t_max - hit->t};
-      path.origin.query.path = path.state;
+      path.pass(point, bsdf, *next, hit->t);
     }
   }
 

@@ -248,6 +248,7 @@ double ParticleIntegrator::carry(const RenderContext& context, const EmittedRay&
     const float u_lobe = p.sampler.next_1d(), u_absorb = p.sampler.next_1d();
     const auto next = bsdf.sample(point.wo, p.sampler.next_2d(), u_lobe);
     const bool transparent = next && (next->flags & kTransparent);
+    if (next && (next->flags & kPortal)) break;  // absorbed: where it would come out there is no telling
     Rgb left;
     if (next && next->pdf_dir > 0.0f) left = p.power * next->value / next->pdf_dir;
     if (!transparent && (!is_lit || !(visible & kRayDiffuse))) left = Rgb();

@@ -199,7 +199,7 @@ class PathIntegrator final : public Integrator {
       // Light that goes below the surface comes out elsewhere, diffusely: that is where lights are looked for, and the next direction.
       if (next->flags & kSubsurface) {
         Sampler below = sampler.fork(bounce + kBelow);
-        const auto exit = walk_below(context.scene, point, bsdf.subsurface(next->subsurface), below.fork(kBelow));
+        const auto exit = walk_below(context.scene, point, bsdf.subsurface(next->which), below.fork(kBelow));
         if (!exit) break;
         path.throughput *= exit->weight;
         weight *= exit->weight;
@@ -214,16 +214,14 @@ class PathIntegrator final : public Integrator {
       }
 
       // Follow it. A transparent surface changes nothing but the throughput: the ray goes on as the one it was.
-      path.travelled += hit->t;
-      if (has_media && (next->flags & (kTransparent | kTransmission))) media.cross(context.scene, point, next->wi);
+      if (has_media && (next->flags & (kTransparent | kTransmission))) media.cross(context.scene, point, transparent ? -point.wo : next->wi);
       if (transparent) {
         const bool is_there = !context.scene.material(context.scene.material_of(point.instance, point.triangle)).only_volume;
         if (is_there && !advance(path.state, next->flags, s_.limits)) break;
-        const float left = path.ray.t_max - hit->t;
-        path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, left};
-        path.origin.query.path = path.state;
+        path.pass(point, bsdf, *next, hit->t);
         continue;
       }
+      path.travelled += hit->t;
       const float least_pdf = path.state.least_pdf;
       may_scatter = advance(path.state, next->flags, s_.limits);
       const FilmSpec& spec = film.spec();
@@ -312,7 +310,7 @@ const Descriptor& path_descriptor() {
       /*bakes=*/true,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesSubsurface | kCarriesVolumes};
+      kCarriesSubsurface | kCarriesVolumes | kCarriesPortals};
   return descriptor;
 }
 

@@ -39,9 +39,13 @@ class WhittedIntegrator final : public Integrator {
 
       const auto next = bsdf.sample_delta(point.wo, sampler.next_1d());
       if (!next || !advance(path.state, next->flags, limits_)) break;
-      if (!(next->flags & kTransparent)) path.seen_from_camera = false;
       path.throughput *= next->value / next->pdf_dir * bsdf.delta_probability();
       if (is_black(path.throughput)) break;
+      if (next->flags & kTransparent) {
+        path.pass(point, bsdf, *next, hit->t);
+        continue;
+      }
+      path.seen_from_camera = false;
       path.travelled += hit->t;
       path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
     }
@@ -78,7 +82,11 @@ const Descriptor& whitted_descriptor() {
           {"max_bounces", "Bounces", Kind::kInt, 12, 0, 1024, "Reflections and refractions in a row"},
           {"transparent_bounces", "Transparent", Kind::kInt, 8, 0, 1024, "Transparent surfaces passed by one ray"},
       },
-      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<WhittedIntegrator>(p); }};
+      [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<WhittedIntegrator>(p); },
+      /*bakes=*/false,
+      /*kept_version=*/0,
+      /*kept_by_place=*/false,
+      kCarriesPortals};
   return descriptor;
 }
 

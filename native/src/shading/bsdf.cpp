@@ -62,7 +62,7 @@ Bsdf::Entry* Bsdf::new_entry(Rgb weight, uint8_t flags, const Frame& frame) {
   const uint8_t left = flags & ~sides_without(flags, without_);
   if (!(left & (kReflection | kTransmission))) return nullptr;
   Entry& e = entries_[count_++];
-  e.frame = frame, e.weight = w, e.albedo = -1.0f, e.flags = left, e.bumped = !(frame.z == ns_);
+  e.frame = frame, e.weight = w, e.albedo = -1.0f, e.flags = left, e.bumped = !(frame.z == ns_), e.all_around = false;
   flags_ |= left;
   return &e;
 }
@@ -81,9 +81,22 @@ void Bsdf::add_subsurface(const Subsurface& given) {
   subsurface_[subsurface_count_++] = s;
 }
 
+void Bsdf::add_portal(Vec3 position, Vec3 direction, Rgb weight) {
+  const Rgb w = positive(weight);
+  if (!(average(w) >= kLeastWeight) || !is_finite(w) || !is_finite(position) || portal_count_ == kMaxPortals) return;
+  portals_[portal_count_++] = {position, direction, w};
+}
+
+Rgb Bsdf::passed() const {
+  Rgb sum = transparency;
+  for (int i = 0; i < portal_count_; ++i) sum += portals_[i].weight;
+  return sum;
+}
+
 void Bsdf::finish(Vec3 wo) {
   float sum = std::max(average(transparency), 0.0f);
   for (int i = 0; i < subsurface_count_; ++i) sum += subsurface_[i].select = average(subsurface_[i].weight), flags_ |= kSubsurface;
+  for (int i = 0; i < portal_count_; ++i) sum += portals_[i].select = average(portals_[i].weight), flags_ |= kTransparent | kPortal;
   const bool single = count_ == 1 && sum == 0.0f;
   select_transparent_ = std::max(average(transparency), 0.0f);
   for (int i = 0; i < count_; ++i) {
@@ -97,10 +110,11 @@ void Bsdf::finish(Vec3 wo) {
   select_transparent_ *= scale;
   for (int i = 0; i < count_; ++i) entries_[i].select *= scale;
   for (int i = 0; i < subsurface_count_; ++i) subsurface_[i].select *= scale;
+  for (int i = 0; i < portal_count_; ++i) portals_[i].select *= scale;
 }
 
 void Bsdf::blur(float alpha) {
-  flags_ &= kTransparent | kSubsurface;
+  flags_ &= kTransparent | kSubsurface | kPortal;
   for (int i = 0; i < count_; ++i) {
     Entry& e = entries_[i];
     blur_lobe(e.lobe, alpha);
@@ -112,6 +126,10 @@ void Bsdf::blur(float alpha) {
 void Bsdf::choose(uint8_t kinds, Vec3 wo) {
   chosen_ = kinds, flags_ = 0;
   float sum = select_transparent_ = kinds & kTransparent ? std::max(average(transparency), 0.0f) : 0.0f;
+  for (int i = 0; i < portal_count_; ++i) {
+    portals_[i].select = kinds & kTransparent ? average(portals_[i].weight) : 0.0f;
+    if (kinds & kTransparent) sum += portals_[i].select, flags_ |= kTransparent | kPortal;
+  }
   for (int i = 0; i < count_; ++i) {
     Entry& e = entries_[i];
     e.select = 0.0f;
@@ -124,10 +142,11 @@ void Bsdf::choose(uint8_t kinds, Vec3 wo) {
   const float scale = sum > 0.0f ? 1.0f / sum : 0.0f;
   select_transparent_ *= scale;
   for (int i = 0; i < count_; ++i) entries_[i].select *= scale;
+  for (int i = 0; i < portal_count_; ++i) portals_[i].select *= scale;
 }
 
 void Bsdf::hold_out() {
-  count_ = subsurface_count_ = 0;
+  count_ = subsurface_count_ = portal_count_ = 0;
   emission = Rgb(), holdout = Rgb(1.0f) - transparency;
   flags_ &= kTransparent;
   select_transparent_ = flags_ ? 1.0f : 0.0f;
@@ -179,12 +198,7 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, Vec2 u, float u_lobe) const {
     if (left < e.select) return sample_entry(e, wo, u, std::min(left / e.select, kOneMinusEpsilon));
     left -= e.select;
   }
-  for (int i = 0; i < subsurface_count_; ++i) {
-    const Subsurface& s = subsurface_[i];
-    if (left < s.select) return BsdfSample{{}, s.weight, s.select, kSubsurface, 1.0f, int8_t(i)};
-    left -= s.select;
-  }
-  if (select_transparent_ > 0.0f) return BsdfSample{-wo, transparency, select_transparent_, kTransparent, 0.0f};
+  if (const auto elsewhere = sample_elsewhere(wo, left)) return elsewhere;
   // Rounding left a little over: it belongs to the last lobe that can be chosen.
   for (int i = count_ - 1; i >= 0; --i)
     if (entries_[i].select > 0.0f) return sample_entry(entries_[i], wo, u, kOneMinusEpsilon);
@@ -192,7 +206,7 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, Vec2 u, float u_lobe) const {
 }
 
 bool Bsdf::is_view_free() const {
-  if (count_ == 1 && select_transparent_ == 0.0f) return true;
+  if (count_ == 1 && select_transparent_ == 0.0f && !has_portals()) return true;
   return std::all_of(begin(), end(), [](const Entry& e) { return std::holds_alternative<Lambert>(e.lobe); });
 }
 
@@ -218,6 +232,7 @@ float Bsdf::delta_probability() const {
   for (const Entry& e : *this)
     if (e.flags & kSpecular) sum += e.select;
   for (int i = 0; i < subsurface_count_; ++i) sum += subsurface_[i].select;
+  for (int i = 0; i < portal_count_; ++i) sum += portals_[i].select;
   return sum;
 }
 
@@ -228,13 +243,25 @@ std::optional<BsdfSample> Bsdf::sample_delta(Vec3 wo, float u_lobe) const {
     if (left < e.select) return sample_entry(e, wo, {0.5f, 0.5f}, std::min(left / e.select, kOneMinusEpsilon));
     left -= e.select;
   }
+  return sample_elsewhere(wo, left);
+}
+
+// Whatever does not scatter where it is met, by what is left of the number after the lobes.
+std::optional<BsdfSample> Bsdf::sample_elsewhere(Vec3 wo, float left) const {
   for (int i = 0; i < subsurface_count_; ++i) {
     const Subsurface& s = subsurface_[i];
     if (left < s.select) return BsdfSample{{}, s.weight, s.select, kSubsurface, 1.0f, int8_t(i)};
     left -= s.select;
   }
-  if (select_transparent_ > 0.0f) return BsdfSample{-wo, transparency, select_transparent_, kTransparent, 0.0f};
-  return {};
+  for (int i = 0; i < portal_count_; ++i) {
+    const Portal& p = portals_[i];
+    const bool is_last = i + 1 == portal_count_ && !(select_transparent_ > 0.0f);  // what rounding left over is its
+    if (p.select > 0.0f && (left < p.select || is_last))
+      return BsdfSample{p.direction, p.weight, p.select, kTransparent | kPortal, 0.0f, int8_t(i)};
+    left -= p.select;
+  }
+  if (!(select_transparent_ > 0.0f)) return {};
+  return BsdfSample{-wo, transparency, select_transparent_, kTransparent, 0.0f};
 }
 
 std::optional<BsdfSample> Bsdf::sample_entry(const Entry& e, Vec3 wo, Vec2 u, float u_lobe) const {
@@ -243,7 +270,7 @@ std::optional<BsdfSample> Bsdf::sample_entry(const Entry& e, Vec3 wo, Vec2 u, fl
   if (!s || !(s->pdf_dir > 0.0f)) return {};
   const Vec3 wi = e.frame.to_world(s->wi);
   const bool transmitted = s->flags & kTransmission;
-  if ((dot(ng_, wi) < 0.0f) != transmitted) return {};
+  if (!e.all_around && (dot(ng_, wi) < 0.0f) != transmitted) return {};
 
   const float shadow = transmitted ? 1.0f : shadowing(e, wi, s->wi.z, true);
   BsdfSample result{wi, e.weight * s->value * shadow, e.select * s->pdf_dir, s->flags, s->roughness};

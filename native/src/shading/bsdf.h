@@ -18,8 +18,16 @@ struct BsdfSample {
   float pdf_dir = 0; // of the whole mix, lobe choice included; for delta lobes the probability of the choice
   uint8_t flags = 0; // of the lobe that was sampled: side and kind; kTransparent alone for straight through
   float roughness = 0;  // of the sampled lobe, for the footprint and for caustic filtering
-  int8_t subsurface = -1;  // which, where the flags say kSubsurface: wi is then not set
+  int8_t which = -1;  // of what goes on elsewhere: the subsurface, where the flags say so (wi is then not set); the portal, if any
   bool is_delta() const { return flags & (kSpecular | kTransparent | kSubsurface); }
+};
+
+// A Ray Portal BSDF: what comes to it goes on at another place.
+struct Portal {
+  Vec3 position;   // world, metres
+  Vec3 direction;  // unit
+  Rgb weight;
+  float select = 0;  // probability
 };
 
 // Reuse one object: 24 lobes are some kilobytes, and clear() touches none of them.
@@ -30,7 +38,7 @@ class Bsdf {
   Bsdf() {}  // entries_ stay uninitialised
   // `without`: CausticFlags, sides of glossy lobes to leave out.
   void clear(Vec3 ng, Vec3 ns, uint8_t without = 0) {
-    count_ = 0, subsurface_count_ = 0, flags_ = 0, chosen_ = kAll, ng_ = ng, ns_ = ns, without_ = without, emission = Rgb(),
+    count_ = 0, subsurface_count_ = 0, portal_count_ = 0, flags_ = 0, chosen_ = kAll, ng_ = ng, ns_ = ns, without_ = without, emission = Rgb(),
     transparency = Rgb(), holdout = Rgb();
   }
   uint8_t without() const { return without_; }
@@ -50,6 +58,12 @@ class Bsdf {
   const Subsurface& subsurface(int i) const { return subsurface_[i]; }
   int subsurface_count() const { return subsurface_count_; }
 
+  // Drawn as what is transparent is.
+  void add_portal(Vec3 position, Vec3 direction, Rgb weight);
+  const Portal& portal(int i) const { return portals_[i]; }
+  bool has_portals() const { return portal_count_ > 0; }
+  Rgb passed() const;  // straight through, or by portals
+
   // Adds `lobe` in the frame whose z is the lobe's own (bumped) normal. Negative components count as 0; weights that come to
   // nothing are dropped, and so are lobes beyond kMaxLobes.
   // `albedo`: of the lobe towards the viewer, where the caller has it already.
@@ -58,6 +72,7 @@ class Bsdf {
     if (Entry* e = new_entry(weight, lobe.flags(), frame)) {
       if (albedo && e->flags == lobe.flags()) e->albedo = average(e->weight * *albedo);
       std::construct_at(&e->lobe, std::in_place_type<L>, lobe);
+      if constexpr (requires { L::kAllAround; }) e->all_around = true;
       if constexpr (requires(L l) { l.remove(uint8_t(0)); }) {
         if (e->flags != lobe.flags()) std::get<L>(e->lobe).remove(lobe.flags() & ~e->flags);
       }
@@ -116,6 +131,7 @@ class Bsdf {
     float select = 0;   // probability
     uint8_t flags = 0;
     bool bumped = false;  // its normal is not ns_
+    bool all_around = false;  // samples may be on any side
   };
   static_assert(std::is_trivially_copyable_v<Entry>);
   Entry* new_entry(Rgb weight, uint8_t flags, const Frame& frame);  // all but its lobe; null if it comes to nothing
@@ -125,15 +141,19 @@ class Bsdf {
   template <class Accept>
   LobeEval eval_if(Vec3 wo, Vec3 wi, const Entry* skipped, Accept accept) const;
   std::optional<BsdfSample> sample_entry(const Entry& e, Vec3 wo, Vec2 u, float u_lobe) const;
+  std::optional<BsdfSample> sample_elsewhere(Vec3 wo, float left) const;
 
-  static constexpr int kMaxSubsurface = 4;
+  static constexpr int kMaxSubsurface = 4, kMaxPortals = 4;
   union {
     Entry entries_[kMaxLobes];
   };
   union {
     Subsurface subsurface_[kMaxSubsurface];
   };
-  int subsurface_count_ = 0;
+  union {
+    Portal portals_[kMaxPortals];
+  };
+  int subsurface_count_ = 0, portal_count_ = 0;
   bool carries_subsurface_ = false;
   static constexpr uint8_t kAll = kDiffuse | kGlossy | kSpecular | kTransparent;
   int count_ = 0;

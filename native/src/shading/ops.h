@@ -16,5 +16,7 @@ std::span<const Op> texture_ops();
 std::span<const Op> closure_ops();
 std::span<const Op> principled_ops();
 std::span<const Op> volume_ops();
+std::span<const Op> hair_ops();
+std::span<const Op> strand_ops();
 
 }  // namespace gi

@@ -22,6 +22,12 @@ void transparent(const Operands& o, ShadeState& s) {
   if (s.bsdf) s.bsdf->transparency += o.c(1) * o.f(0);
 }
 
+// weight, color, position, direction; whether there is a position. A zero vector for a direction is straight on.
+void ray_portal(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  s.bsdf->add_portal(o.imm(4) ? o.v(2) : s.point.position, normalize_or(o.v(3), -s.point.wo), o.c(1) * o.f(0));
+}
+
 // What Alpha lets through; the lobes that go with it scale their own weight.
 void alpha(const Operands& o, ShadeState& s) {
   if (s.bsdf) s.bsdf->transparency += Rgb(o.f(0) * (1.0f - clamp01(o.f(1))));
@@ -138,6 +144,7 @@ const Op kOps[] = {
     {"mix_weights", "ff", "ff", 0, OpKind::kPure, mix_weights},
     {"emission", "", "fvf", 0, OpKind::kClosure, emission, kAddsEmission},
     {"transparent", "", "fv", 0, OpKind::kClosure, transparent, kAddsTransparency},
+    {"ray_portal", "", "fvvv", 1, OpKind::kClosure, ray_portal, kAddsLobe | kAddsTransparency | kSeesPoint},
     {"alpha", "", "ff", 0, OpKind::kClosure, alpha, kAddsTransparency},
     {"holdout", "", "f", 0, OpKind::kClosure, holdout, kAddsLobe},
     {"diffuse", "", "fvfv", 0, OpKind::kClosure, diffuse, kAddsLobe},

@@ -72,7 +72,7 @@ void for_each_pixel(const RenderContext& context, int pass, Film& film, const F&
 
 // The data passes. Blender's rule: a surface counts from half opacity on.
 inline void record_surface(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, PixelSample& sample) {
-  if (sample.has_surface || average(bsdf.transparency) > 0.5f) return;
+  if (sample.has_surface || average(bsdf.passed()) > 0.5f) return;
   sample.has_surface = true;
   sample.depth = context.camera.depth(point.position);
   sample.position = point.position;
@@ -125,6 +125,22 @@ struct CameraPath {
     if (!program.has_emission()) return Rgb();
     ShadingPoint point = scene.shading_point(ray, hit, state, footprint(camera, hit));
     return surface_emission(context, point, scene.emission(point), origin, mode);
+  }
+
+  // The ray goes on past a surface at `distance` that did not scatter it: straight, or from where a portal leads to. No light is chosen
+  // for what lies behind portals: the ray has to meet it.
+  void pass(const ShadingPoint& point, const Bsdf& bsdf, const BsdfSample& next, float distance) {
+    travelled += distance;
+    if (next.which < 0) {
+      ray = {offset_point(point.position, point.ng, ray.direction), ray.direction, 0.0f, ray.t_max - distance};
+    } else {
+      constexpr float kMoved2 = 1e-9f;  // square metres; Blender's own
+      const Portal& p = bsdf.portal(next.which);
+      const bool is_elsewhere = length_squared(p.position - point.position) > kMoved2;
+      ray = {is_elsewhere ? p.position : offset_point(p.position, point.ng, p.direction), p.direction};
+    }
+    if (next.flags & kPortal) origin.pdf_dir = kInf;
+    origin.query.path = state;
   }
 
   // The ray arrives at a surface: shades it, for the data passes too, and cuts out what is held out.

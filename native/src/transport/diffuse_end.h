@@ -107,7 +107,7 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
       // From here either the diffuse lobes are followed, which then gather, or the others.
       add(at_gather(point, bsdf), kIndirectDepth, kCausticTerm);
       const float diffuse = average(bsdf.albedo(point.wo, kDiffuse));
-      const float others = average(bsdf.albedo(point.wo, kGlossy | kSpecular) + bsdf.transparency);
+      const float others = average(bsdf.albedo(point.wo, kGlossy | kSpecular) + bsdf.passed());
       const float p_diffuse = others > 0.0f ? std::clamp(diffuse / (diffuse + others), 0.1f, 0.9f) : 1.0f;
       if (p_diffuse == 1.0f) {
         add(direct_light(), depth + 1, kDirectTerm);
@@ -142,13 +142,12 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
     const Rgb weight = next->value / (p_lobes * next->pdf_dir);
     path.throughput *= weight;
     if (is_black(path.throughput)) break;
-    path.travelled += hit->t;
     if (transparent) {
       if (!advance(path.state, next->flags, s.limits)) break;
-      path.ray = {offset_point(point.position, point.ng, path.ray.direction), path.ray.direction, 0.0f, path.ray.t_max - hit->t};
-      path.origin.query.path = path.state;
+      path.pass(point, bsdf, *next, hit->t);
       continue;
     }
+    path.travelled += hit->t;
     const bool gathers_next = gathers && (next->flags & kDiffuse);
     if (depth == 0) beyond = gathers_next ? kGlobalTerm : kSpecularTerm;
     may_scatter = advance(path.state, next->flags, s.limits);

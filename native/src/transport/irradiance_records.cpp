@@ -193,9 +193,12 @@ void IrradianceRecords::seek(const Work& work, const Camera& eye, int x, int y, 
     const auto next = bsdf.sample(point.wo, sampler.next_2d(), u_lobe);
     if (!next || !(next->pdf_dir > 0.0f)) return;
     path.throughput *= next->value / next->pdf_dir;
-    path.travelled += hit->t;
     if (!advance(path.state, next->flags, s_.limits) || max_component(path.throughput) < 0.01f) return;
-    if (!(next->flags & kTransparent)) path.seen_from_camera = false;
+    if (next->flags & kTransparent) {
+      path.pass(point, bsdf, *next, hit->t);
+      continue;
+    }
+    path.travelled += hit->t, path.seen_from_camera = false;
     path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
   }
 }

@@ -19,6 +19,7 @@ inline uint32_t visibility_of(uint32_t kind) {
 // Moves `path` past a scattering event of the lobe `flags`. False when a limit is exceeded: the next surface then only
 // emits, so that n bounces of indirect light are what light sampling at n surfaces sees.
 inline bool advance(PathState& path, uint8_t flags, const BounceLimits& limits) {
+  if (flags & kPortal) ++path.portal_depth;
   if (flags & kTransparent) return ++path.transparent_depth <= limits.transparent;
   ++path.depth;
   bool within = path.depth <= limits.total;

@@ -146,6 +146,7 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     const float u_lobe = sampler.next_1d(), u_continue = sampler.next_1d();
     const auto next = v.bsdf.sample(v.point.wo, sampler.next_2d(), u_lobe);
     if (!next || !(next->pdf_dir > 0.0f)) return;
+    if (next->flags & kPortal) return;  // where light would come out there is no telling
     if (next->flags & kTransparent) {
       passed *= next->value / next->pdf_dir;
       if (!advance(state, next->flags, settings.limits) || is_black(passed)) return;

@@ -6,6 +6,7 @@
 //     LobeEval eval(Vec3 wo, Vec3 wi) const;                            // value = f |cos θi|, pdf_dir; zero for delta lobes
 //     std::optional<LobeSample> sample(Vec3 wo, Vec2 u, float u_lobe) const;
 //     Rgb albedo(Vec3 wo) const;                                        // directional albedo (or a close, positive estimate)
+//     static constexpr bool kAllAround = true;                          // fibres': what they sample may be on any side of the surface
 //   };
 #pragma once
 #include <optional>
@@ -23,6 +24,7 @@ enum LobeFlags : uint8_t {
   kSpecular = 16,     // delta in direction
   kTransparent = 32,  // straight through, does not count as a bounce
   kSubsurface = 64,   // into the surface, to come out elsewhere: only where an integrator carries it
+  kPortal = 128,      // with kTransparent: through a ray portal
 };
 
 struct LobeEval {

@@ -3,6 +3,9 @@
 #include <variant>
 
 #include "shading/lobes/ashikhmin_shirley.h"
+#include "shading/lobes/hair_chiang.h"
+#include "shading/lobes/hair_huang.h"
+#include "shading/lobes/hair_strand.h"
 #include "shading/lobes/lambert.h"
 #include "shading/lobes/microfacet.h"
 #include "shading/lobes/oren_nayar.h"
@@ -13,6 +16,7 @@
 
 namespace gi {
 
-using Lobe = std::variant<Lambert, OrenNayar, Translucent, GgxLobe, BeckmannLobe, AshikhminShirley, ThinTransmission, Sheen, Velvet, Toon>;
+using Lobe = std::variant<Lambert, OrenNayar, Translucent, GgxLobe, BeckmannLobe, AshikhminShirley, ThinTransmission, Sheen, Velvet, Toon,
+                          HairStrand, HairChiang, HairHuang>;
 
 }  // namespace gi

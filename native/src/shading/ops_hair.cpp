@@ -1,0 +1,71 @@
+// Ops of the two hair nodes: absorption from colours and from pigments, and their lobes. Where fibres lie is strand's to say (scene/).
+#include "shading/closures.h"
+#include "shading/ops.h"
+
+namespace gi {
+namespace {
+
+constexpr float kMostAbsorption = 1e8f;  // of black
+
+// value, random, amount: up to half the amount less or more.
+float varied(float value, float random, float amount) { return value * (1.0f + 2.0f * (random - 0.5f) * amount); }
+void vary(const Operands& o, ShadeState&) { o.set(0, varied(o.f(1), o.f(2), o.f(3))); }
+
+// The absorption by which many fibres together have a colour. [Chiang et al. 2016, eq. 9]
+void absorption_of_color(const Operands& o, ShadeState&) {
+  const Rgb color = positive(o.c(1));
+  const float depth = HairChiang::absorption_depth(o.f(2));
+  Rgb sigma;
+  for (int i = 0; i < 3; ++i) sigma[i] = std::min(sqr(std::log(color[i]) / depth), kMostAbsorption);
+  o.set(0, sigma);
+}
+
+// melanin, redness. [d'Eon et al. 2011, §6.1, for the two pigments]
+void absorption_of_melanin(const Operands& o, ShadeState&) {
+  const float amount = -std::log(std::max(1.0f - o.f(1), 1e-4f));
+  o.set(0, Rgb(0.506f, 0.841f, 1.653f) * (amount * (1.0f - o.f(2))) + Rgb(0.343f, 0.733f, 1.924f) * (amount * o.f(2)));
+}
+
+// weight, color, roughness along and around, offset, tangent; along and across the surface, whether it is a strand; side
+void hair_strand(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  const bool linked = !(o.v(5) == Vec3{}), strand = o.f(8) != 0.0f;
+  const Vec3 tangent = normalize_or(linked ? o.v(5) : strand ? o.v(6) : o.v(7), Vec3{});
+  if (tangent == Vec3{}) return;
+  const Vec3 n = strand ? s.point.ns : visible_normal(s, s.point.ns);
+  const float offset = linked || strand ? -o.f(4) : 0.0f;
+  add_lobe(s, o.c(1) * o.f(0), HairStrand::make(Frame::from_normal(n).to_local(tangent), o.f(2), o.f(3), offset, o.imm(9) != 0), n);
+}
+
+// weight, absorption, roughness, radial roughness, coat, offset, ior; along the fibre, where it is met
+void hair_chiang(const Operands& o, ShadeState& s) {
+  if (!s.bsdf) return;
+  const Vec3 x = normalize_or(o.v(7), Vec3{}), y = normalize_or(cross(x, s.point.wo), Vec3{});
+  if (y == Vec3{}) return;
+  const float met = o.f(8), h = std::abs(met) <= 1.0f ? met : dot(cross(s.point.ng, x), cross(x, y));
+  add_lobe(s, Rgb(o.f(0)), HairChiang::make(positive(o.c(1)), o.f(2), o.f(3), o.f(4), o.f(5), std::max(o.f(6), 1e-3f), h), y, x);
+}
+
+// weight, absorption, roughness, offset, ior, aspect, R, TT, TRT; along the fibre
+void hair_huang(const Operands& o, ShadeState& s) {
+  if (!s.bsdf || (o.f(6) <= 0.0f && o.f(7) <= 0.0f && o.f(8) <= 0.0f)) return;
+  const Vec3 y = normalize_or(o.v(9), Vec3{}), x = normalize_or(cross(y, s.point.wo), Vec3{});
+  if (x == Vec3{}) return;
+  const HairHuang::Look look{positive(o.c(1)), o.f(2), o.f(3), std::max(o.f(4), 1e-3f), std::max(o.f(5), 1e-3f), o.f(6), o.f(7), o.f(8)};
+  add_lobe(s, Rgb(o.f(0)), HairHuang::make(look), x, y);
+}
+
+const Op kOps[] = {
+    {"vary", "f", "fff", 0, OpKind::kPure, vary},
+    {"absorption_of_color", "v", "vf", 0, OpKind::kPure, absorption_of_color},
+    {"absorption_of_melanin", "v", "ff", 0, OpKind::kPure, absorption_of_melanin},
+    {"hair_strand", "", "fvfffvvvf", 1, OpKind::kClosure, hair_strand, kAddsLobe},
+    {"hair_chiang", "", "fvfffffvf", 0, OpKind::kClosure, hair_chiang, kAddsLobe},
+    {"hair_huang", "", "fvfffffffv", 0, OpKind::kClosure, hair_huang, kAddsLobe},
+};
+
+}  // namespace
+
+std::span<const Op> hair_ops() { return kOps; }
+
+}  // namespace gi
