@@ -135,9 +135,8 @@ class Program:
     volume: int = -1  # index of the program of what fills objects of this material; -1: nothing
     only_volume: bool = False  # the surface is not there
     volume_program: Program | None = None  # until it has its index
-    needs: list[str] = field(
-        default_factory=list
-    )  # what an integrator has to carry: "subsurface", "volumes", "portals"
+    # What an integrator has to carry: "subsurface", "absorption" (volumes that do no more), "volumes" or "portals".
+    needs: list[str] = field(default_factory=list)
     approximated: list[str] = field(default_factory=list)  # what is rendered as something else, one text for each node
 
 

@@ -26,7 +26,8 @@ from .world import export_world
 # What integrators make of what they do not carry.
 WITHOUT = {
     "subsurface": "does not follow light below surfaces: subsurface scattering is diffuse of the same albedo",
-    "volumes": "does not render volumes: they are left out",
+    "volumes": "does not render volumes that scatter or glow: they are left out",
+    "absorption": "does not render volumes: they are left out",
     "portals": "sends no light through ray portals: they only show what lies behind them",
 }
 

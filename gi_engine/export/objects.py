@@ -28,7 +28,7 @@ from .warnings import Warnings
 
 MATRIX_BYTES = 64
 MATRICES_ARE_BUFFERS = bpy.app.version >= (5, 0, 0)
-UNSUPPORTED = {"CURVES": "hair curves", "POINTCLOUD": "point clouds", "VOLUME": "volumes"}
+UNSUPPORTED = {"CURVES": "hair curves", "POINTCLOUD": "point clouds", "VOLUME": "volume grids"}
 IGNORED = (bpy.types.Curve, bpy.types.MetaBall, bpy.types.Camera, bpy.types.Armature, bpy.types.Lattice)
 VISIBILITY = {
     "visible_camera": CAMERA,

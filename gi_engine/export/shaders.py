@@ -23,7 +23,10 @@ class Shaders:
         return [self.material(material) for material in materials]
 
     def material(self, material) -> int:
-        index = self.once(material, self.compiler.material)
+        return self.filled(self.once(material, self.compiler.material))
+
+    def filled(self, index: int) -> int:
+        """`index` of a program whose volume has its own index, too."""
         program = self.scene.programs[index]
         if program.volume_program is not None:
             program.volume = len(self.scene.programs)
@@ -36,7 +39,7 @@ class Shaders:
         return self.once(light, self.compiler.light) if has_nodes(light) else -1
 
     def world(self, world) -> int:
-        return self.once(world, self.compiler.world)
+        return self.filled(self.once(world, self.compiler.world))
 
     def once(self, owner, compile_program) -> int:
         key = owner.as_pointer() if owner else 0

@@ -39,21 +39,6 @@ NOT_FOR_CYCLES = {
     "ShaderNodeSqueeze": "is from before Blender 2.8",
     "ShaderNodeScript": "needs Open Shading Language",
 }
-# Ops whose values are other ones elsewhere in an object.
-VARIES_IN_SPACE = frozenset(
-    {
-        "position",
-        "object_position",
-        "generated",
-        "uv",
-        "attribute",
-        "camera_coordinates",
-        "camera_data",
-        "window",
-        "to_space",
-        "incoming",
-    }
-)
 COMBINING = {"ShaderNodeMixShader", "ShaderNodeAddShader"}
 MOST_CLOSURES = 24  # Bsdf::kMaxLobes
 AS_CYCLES = "as in Cycles"
@@ -127,22 +112,18 @@ class Compiler:
         program.bump_correction = getattr(getattr(material, "cycles", None), "use_bump_map_correction", True)
         return walker.noted(program)
 
-    def volume(self, surface: TreeWalker, material) -> Program | None:
-        """What fills the material's objects."""
+    def volume(self, surface: TreeWalker, owner) -> Program | None:
+        """What fills the material's objects, or the world."""
         output = surface.tree.get_output_node("CYCLES")
         socket = output.inputs.get("Volume") if output else None
         if socket is None or surface.resolve(Context(surface.tree), socket).node is None:
             return None
-        walker = TreeWalker(self, surface.who, material, is_volume=True)
+        walker = TreeWalker(self, surface.who, owner, is_volume=True)
         output = walker.tree.get_output_node("CYCLES")
         walker.closure_input(Context(walker.tree), output.inputs["Volume"], walker.builder.constant(1.0))
-        if walker.builder.uses(VARIES_IN_SPACE):
-            walker.approximate(
-                output, "its volume varies in space; each object is filled as it is at the ray's beginning"
-            )
-        surface.needs.add("volumes")
+        surface.needs |= walker.needs
         surface.approximated |= walker.approximated
-        return walker.builder.finish(f"{material.name}, volume")
+        return walker.builder.finish(f"{owner.name}, volume")
 
     def light(self, light) -> Program:
         """The emission of a lamp's node tree, to be multiplied with the lamp's own."""
@@ -161,9 +142,11 @@ class Compiler:
         with deep_recursion():
             walker.aovs()
             if output is not None:
-                walker.warn_of_volume(Context(walker.tree), output)
                 walker.closure_input(Context(walker.tree), output.inputs["Surface"], walker.builder.constant(1.0))
-        return walker.noted(walker.builder.finish(owner.name))
+            volume = self.volume(walker, owner)
+        program = walker.builder.finish(owner.name)
+        program.volume_program = volume
+        return walker.noted(program)
 
     def _default_material(self) -> Program:
         """What Cycles gives to objects without a material: a fresh Principled BSDF from 5.0 on, diffuse before."""
@@ -243,13 +226,6 @@ class TreeWalker:
     def name_of(self, node) -> str:
         """As the user knows the node: inlining puts a number before the names of all but outputs."""
         return NUMBERED.sub("", node.name) if self.inlined else node.name
-
-    def warn_of_volume(self, context: Context, output) -> None:
-        socket = output.inputs.get("Volume")
-        if socket is not None and self.resolve(context, socket).node is not None:
-            self.compiler.warn(
-                f"{self.who}: volumes are not rendered yet; node '{self.name_of(output)}' renders without its volume"
-            )
 
     # ---------------------------------------------------------------- following links
 

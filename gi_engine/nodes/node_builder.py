@@ -88,7 +88,7 @@ class NodeBuilder:
         self.walker.approximate(self.node, text)
 
     def need(self, what: str) -> None:
-        """Says that it takes an integrator that carries `what` ("subsurface", "volumes", "portals")."""
+        """Says that it takes an integrator that carries `what` ("subsurface", "absorption", "volumes", "portals")."""
         self.walker.needs.add(what)
 
     def pass_defaults(self) -> None:

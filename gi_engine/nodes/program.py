@@ -136,11 +136,6 @@ class ProgramBuilder:
             yield
         jump[3] = [len(self.code)]  # as an index into self.code until `finish` knows the words
 
-    def uses(self, names) -> bool:
-        """Whether any of these ops is among the instructions."""
-        codes = {op_table()[name][0] for name in names}
-        return any(instruction[0] in codes for instruction in self.code)
-
     def finish(self, name: str) -> Program:
         place: dict[int, int] = {}
         constants: list[float] = []

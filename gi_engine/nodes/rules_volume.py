@@ -11,7 +11,13 @@ BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 
 def coefficients(b, weight, absorption, scattering, emission=BLACK, anisotropy=0.0, extra=0.0, phase=0) -> None:
+    b.need("absorption" if is_black(b, scattering) and is_black(b, emission) else "volumes")
     b.op("volume_coefficients", weight, absorption, scattering, emission, anisotropy, extra, imm=(phase,))
+
+
+def is_black(b, color) -> bool:
+    """Whether it is a constant that is."""
+    return color is BLACK or color == b.constant(*BLACK, kind=color.kind)
 
 
 def volume_rule(idname: str):

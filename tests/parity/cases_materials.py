@@ -172,6 +172,96 @@ def fog(scene):
     camera((0, -4, 2.5), (0, 0, 0.4), 34.0)
 
 
+def cloud_tree(tree):
+    """Coloured and thicker where noise says so, glowing low down: by object and generated coordinates."""
+    places = node(tree, "ShaderNodeTexCoord")
+    noise = node(tree, "ShaderNodeTexNoise", None, {"Vector": places.outputs["Object"], "Scale": 4.0})
+    ends = {"From Min": 0.45, "From Max": 0.7, "To Max": 6.0}
+    thick = node(tree, "ShaderNodeMapRange", None, {"Value": noise.outputs[0], **ends})
+    height = node(tree, "ShaderNodeSeparateXYZ", None, {0: places.outputs["Generated"]})
+    glow = node(tree, "ShaderNodeMath", {"operation": "SUBTRACT", "use_clamp": True}, {0: 0.3, 1: height.outputs["Z"]})
+    looks = {"Density": thick.outputs[0], "Color": noise.outputs[1], "Emission Strength": glow.outputs[0]}
+    return node(tree, "ShaderNodeVolumePrincipled", None, {**looks, "Anisotropy": 0.3, "Emission Color": BRASS})
+
+
+def volume_material(make, surface=None):
+    """`make(tree)` and `surface(tree)` give the nodes whose outputs fill it and cover it."""
+    from bpy import data
+
+    made = data.materials.new("volume")
+    tree = tree_of(made)
+    out = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(make(tree).outputs[0], out.inputs["Volume"])
+    if surface:
+        tree.links.new(surface(tree).outputs[0], out.inputs["Surface"])
+    return made
+
+
+def cloud(scene):
+    """A cloud over a floor, partly within a thin even mist."""
+    square(material("floor", "ShaderNodeBsdfDiffuse", Color=(0.6, 0.5, 0.4)), 3.0)
+    cube(volume_material(cloud_tree), 0.8, location=(0.0, 0.0, 0.9), rotation=(0.2, 0.1, 0.5))
+    cube(volume_of("ShaderNodeVolumeScatter", Density=0.4, Color=(0.5, 0.7, 0.9)), 0.5, location=(0.9, 0.0, 0.6))
+    lamp("AREA", (1.0, 1.5, 3.0), (-0.4, 0.3, 0.0), 150.0, shape="SQUARE", size=1.0, color=LAMP)
+    lamp("SUN", rotation=(0.5, -0.6, 0.0), energy=1.5, angle=0.1)
+    camera((0, -4, 2.5), (0, 0, 0.6), 34.0)
+
+
+def tinted_glass(scene):
+    """Glass that is filled with what absorbs, evenly and not, and with a milky part."""
+    square(material("floor", "ShaderNodeBsdfDiffuse", Color=(0.6, 0.6, 0.6)), 3.0)
+
+    def glass(tree):
+        return node(tree, GLASS, {"distribution": "GGX"}, {"Roughness": 0.0, "IOR": 1.3})
+
+    def even(tree):
+        return node(tree, "ShaderNodeVolumeAbsorption", None, {"Color": (0.9, 0.3, 0.2), "Density": 3.0})
+
+    def banded(tree):
+        places = node(tree, "ShaderNodeTexCoord")
+        wave = node(tree, "ShaderNodeTexWave", None, {"Vector": places.outputs["Object"], "Scale": 2.0})
+        return node(tree, "ShaderNodeVolumeAbsorption", None, {"Color": wave.outputs[0], "Density": 4.0})
+
+    for i, fill in enumerate((even, banded, cloud_tree)):
+        ball(volume_material(fill, glass), 0.4, location=(i - 1.0, 0.0, 0.5))
+    world(SKY)
+    lamp("AREA", (1.0, 1.5, 3.0), (-0.4, 0.3, 0.0), 150.0, shape="SQUARE", size=2.0, color=LAMP)
+    camera((0, -4, 2.5), (0, 0, 0.4), 34.0)
+
+
+def fill_world(scene, make):
+    world((0.0, 0.0, 0.0))
+    tree = scene.world.node_tree
+    out = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputWorld")
+    tree.links.new(make(tree).outputs[0], out.inputs["Volume"])
+
+
+def misty_world(make):
+    def build(scene):
+        square(material("floor", "ShaderNodeBsdfDiffuse", Color=(0.6, 0.5, 0.4)), 3.0)
+        ball(CLEAR["glass 0"]("glass"), 0.5, location=(-0.6, 0.0, 0.5))
+        ball(volume_of("ShaderNodeVolumePrincipled", Color=RED, Density=3.0), 0.4, location=(0.7, 0.0, 0.5))
+        lamp("AREA", (1.0, 1.5, 3.0), (-0.4, 0.3, 0.0), 150.0, shape="SQUARE", size=1.0, color=LAMP)
+        lamp("POINT", (-1.5, -1.0, 1.0), energy=40.0, shadow_soft_size=0.2, visible=True)
+        fill_world(scene, make)
+        camera((0, -4, 2.5), (0, 0, 0.4), 34.0)
+
+    return build
+
+
+def even_mist(tree):
+    return node(tree, "ShaderNodeVolumeScatter", None, {"Color": (0.7, 0.8, 0.9), "Density": 0.1, "Anisotropy": 0.3})
+
+
+def low_mist(tree):
+    """Thinner with height."""
+    place = node(tree, "ShaderNodeNewGeometry").outputs["Position"]
+    height = node(tree, "ShaderNodeSeparateXYZ", None, {0: place}).outputs["Z"]
+    power = node(tree, "ShaderNodeMath", {"operation": "POWER"}, {0: 0.3, 1: height})
+    thick = node(tree, "ShaderNodeMath", {"operation": "MULTIPLY", "use_clamp": True}, {0: power.outputs[0], 1: 0.3})
+    return node(tree, "ShaderNodeVolumeScatter", None, {"Color": (0.7, 0.8, 0.9), "Density": thick.outputs[0]})
+
+
 def skin_and_marble(scene):
     """Light below surfaces: several kinds, bent normals, thin parts, an area lamp behind."""
     square(material("floor", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5)), 3.0)
@@ -242,6 +332,10 @@ CASES = [
     sheet("principled", LAYERED, small_ball, light),
     Case("fog", fog, samples=128, cycles={"volume_bounces": 0}),
     Case("fog, scattered often", fog, samples=128, cycles={"volume_bounces": 4}),
+    Case("cloud", cloud, samples=128, cycles={"volume_bounces": 2}),
+    Case("tinted glass", tinted_glass, samples=256, cycles={"volume_bounces": 1}),
+    Case("world, even mist", misty_world(even_mist), samples=128, cycles={"volume_bounces": 1}),
+    Case("world, low mist", misty_world(low_mist), samples=128, cycles={"volume_bounces": 1}),
     Case("light below surfaces", skin_and_marble, samples=128),
     Case("ray portals", portals, samples=128),
     Case("filter glossy, little", glossy_room, samples=128, cycles={"blur_glossy": 0.1}),

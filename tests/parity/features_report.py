@@ -18,7 +18,10 @@ def has(*names):
 
 FEATURES = {
     "Subsurface scattering by random walk (else diffuse of the same albedo)": lambda d: "subsurface" in d["carries"],
-    "Volumes: absorption, scattering, emission (else left out)": lambda d: "volumes" in d["carries"],
+    "Volumes that only absorb, evenly or not, in objects and the world (else left out)": lambda d: (
+        "absorption" in d["carries"]
+    ),
+    "Volumes that scatter or glow (else left out)": lambda d: "volumes" in d["carries"],
     "Ray portals (else they show what lies behind them, but let no light through)": lambda d: "portals" in d["carries"],
     "Bakes lightmaps": lambda d: d["bakes"],
     "Keeps what it worked out over frames and in files": lambda d: d["kept_version"] > 0,

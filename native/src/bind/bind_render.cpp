@@ -144,6 +144,7 @@ nb::list describe_integrators() {
     entry["kept_version"] = d.kept_version, entry["kept_by_place"] = d.kept_by_place;
     nb::list carries;
     if (d.carries & kCarriesSubsurface) carries.append("subsurface");
+    if (d.carries & kCarriesAbsorption) carries.append("absorption");
     if (d.carries & kCarriesVolumes) carries.append("volumes");
     if (d.carries & kCarriesPortals) carries.append("portals");
     entry["carries"] = carries;

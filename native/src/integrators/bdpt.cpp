@@ -233,6 +233,7 @@ class BdptIntegrator final : public Integrator {
       const uint32_t visibility = visibility_of(path.state.kind);
       const auto hit = context.scene.intersect(path.ray, visibility);
       add(lamps_along(context, path, hit ? hit->t : kInf, visibility, found), path.state.depth);
+      path.absorb(context, hit ? hit->t : kInf);
       if (!hit) {
         add(leave(context, film, path, found, result), path.state.depth);
         break;
@@ -433,7 +434,7 @@ class BdptIntegrator final : public Integrator {
     ray.t_max = t_surface;
     for (auto hit = context.lights.intersect_lamp(ray, visibility); hit; hit = context.lights.intersect_lamp(ray, visibility, &*hit)) {
       const LightEval e = context.lights.eval_lamp(path.origin.query, ray, *hit);
-      sum += found(e.radiance, e.pdf_dir, hit->lamp);
+      sum += found(e.radiance * passed_by_absorbers(context, ray, hit->t, path.state), e.pdf_dir, hit->lamp);
     }
     return sum;
   }
@@ -526,7 +527,7 @@ const Descriptor& bdpt_descriptor() {
       /*bakes=*/false,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesPortals};
+      kCarriesAbsorption | kCarriesPortals};
   return descriptor;
 }
 
@@ -564,7 +565,7 @@ const Descriptor& vcm_descriptor() {
       /*bakes=*/false,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesPortals};
+      kCarriesAbsorption | kCarriesPortals};
   return descriptor;
 }
 

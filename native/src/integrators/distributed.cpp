@@ -28,6 +28,7 @@ class DistributedIntegrator final : public Integrator {
       const uint32_t visibility = visibility_of(path.state.kind);
       const auto hit = context.scene.intersect(path.ray, visibility);
       result.radiance += path.throughput * lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, kMode, visibility);
+      path.absorb(context, hit ? hit->t : kInf);
       if (!hit) {
         result.radiance += path.throughput * path.leave(context, film, kMode, result);
         break;
@@ -71,9 +72,10 @@ class DistributedIntegrator final : public Integrator {
     const uint32_t visibility = visibility_of(path.state.kind);
     const auto hit = context.scene.intersect(path.ray, visibility);
     const Rgb lamps = lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, LightSampling::kMis, visibility);
-    if (!hit) return lamps + light_beyond(context, path.ray, path.origin, LightSampling::kMis, path.state);
+    const Rgb passed = passed_by_absorbers(context, path.ray, hit ? hit->t : kInf, path.state);
+    if (!hit) return lamps + passed * light_beyond(context, path.ray, path.origin, LightSampling::kMis, path.state);
     ShadingPoint point = context.scene.shading_point(path.ray, *hit, path.state);
-    return lamps + surface_emission(context, point, context.scene.emission(point), path.origin, LightSampling::kMis);
+    return lamps + passed * surface_emission(context, point, context.scene.emission(point), path.origin, LightSampling::kMis);
   }
 
   BounceLimits limits_;
@@ -97,7 +99,7 @@ const Descriptor& distributed_descriptor() {
       /*bakes=*/false,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesPortals};
+      kCarriesAbsorption | kCarriesPortals};
   return descriptor;
 }
 

@@ -60,7 +60,7 @@ class Integrator {
 };
 
 // What paths may meet besides surfaces that scatter where they are met. Of the rest an integrator makes the surface's own fallback.
-enum Carries : uint8_t { kCarriesSubsurface = 1, kCarriesVolumes = 2, kCarriesPortals = 4 };
+enum Carries : uint8_t { kCarriesSubsurface = 1, kCarriesVolumes = 2, kCarriesAbsorption = 4, kCarriesPortals = 8 };
 
 struct Descriptor {
   const char* id;
@@ -73,7 +73,7 @@ struct Descriptor {
   // By place: their rows begin with a position and a normal, so that those near what has changed can be left out.
   int kept_version = 0;
   bool kept_by_place = false;
-  uint8_t carries = 0;  // Carries
+  uint8_t carries = kCarriesAbsorption;  // Carries
 };
 
 const std::vector<Descriptor>& integrators();

@@ -108,6 +108,8 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     const int depth = path.state.depth;
     const auto hit = context.scene.intersect(path.ray, visibility);
     add_luminaire(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, kMode, visibility), depth);
+    const Rgb passed = passed_by_absorbers(context, path.ray, hit ? hit->t : kInf, path.state);
+    path.throughput *= passed, walk.to_luminaires *= passed, walk.to_known_sky *= passed, walk.mirrors *= passed;
     if (!hit) {
       if (!path.seen_from_camera && walk.is_over()) break;
       const LightBeyond beyond = path.leave(context, film, kMode, result);
@@ -252,7 +254,7 @@ const Descriptor& irradiance_cache_descriptor() {
       /*bakes=*/false,
       /*kept_version=*/4,
       /*kept_by_place=*/true,
-      kCarriesPortals};
+      kCarriesAbsorption | kCarriesPortals};
   return descriptor;
 }
 

@@ -36,6 +36,7 @@ class LightIntegrator final : public Integrator {
       const auto hit = context.scene.intersect(path.ray, kRayCamera);
       result.radiance +=
           path.throughput * lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, LightSampling::kOff, kRayCamera);
+      path.absorb(context, hit ? hit->t : kInf);
       if (!hit) {
         result.radiance += path.throughput * path.leave(context, film, LightSampling::kOff, result);
         return;

@@ -214,6 +214,9 @@ double ParticleIntegrator::carry(const RenderContext& context, const EmittedRay&
     p.sampler.jump_to(p.bounce + 1);
     const bool is_direct = p.bounces.scattered == 0;
     const auto hit = context.scene.intersect(p.ray, is_direct ? ~0u : uint32_t(kRayDiffuse));
+    const double sent = sum(p.power);
+    p.power *= passed_by_absorbers(context, p.ray, hit ? hit->t : kInf, p.state);
+    ledger.absorbed += sent - sum(p.power);
     if (!hit) {
       ledger.escaped += sum(p.power);
       return worth;

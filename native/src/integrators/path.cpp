@@ -86,20 +86,15 @@ class PathIntegrator final : public Integrator {
   // The way to the surface at `t_surface`, through what fills the place: what that emits, lamps seen through it, and maybe a scattering,
   // from which the path goes on.
   template <class Add>
-  MediumStep go_through(const RenderContext& context, const Media& media, CameraPath& path, float t_surface, LightSampling mode,
-                        uint32_t visibility, bool& may_scatter, const Sampler& sampler, uint32_t bounce, const Add& add) const {
+  MediumStep go_through(const RenderContext& context, const Surroundings& around, CameraPath& path, float t_surface, LightSampling mode,
+                        uint32_t visibility, bool& may_scatter, const Add& add) const {
     const Scene& scene = context.scene;
+    const auto& [media, random] = around;
     const Vec3 wo = -path.ray.direction;
-    const Medium medium = media.at(scene, path.ray.origin, wo, path.state);
-    add(lamps_along(context, path.ray, t_surface, path.origin, mode, visibility, &medium), path.state.depth);
-    if (medium.empty()) return MediumStep::kPasses;
-    add(medium.emitted(std::min(t_surface, 1e30f)), path.state.depth);
-    Sampler random = sampler.fork(bounce + kWithin);
-    if (!may_scatter || !medium.scatters()) {
-      path.throughput *= medium.transmittance(t_surface);
-      return is_black(path.throughput) ? MediumStep::kEnds : MediumStep::kPasses;
-    }
-    const MediumEvent event = sample_distance(medium, t_surface, path.throughput, random.next_2d());
+    const auto passed = [&](float t) { return media.transmittance(scene, path.ray, t, path.state, random); };
+    add(lamps_along(context, path.ray, t_surface, path.origin, mode, visibility, passed), path.state.depth);
+    const MediumEvent event = media.sample(scene, path.ray, t_surface, path.throughput, may_scatter, path.state, random);
+    add(event.emitted, path.state.depth);
     path.throughput *= event.weight;
     if (is_black(path.throughput)) return MediumStep::kEnds;
     if (!event.scattered) return MediumStep::kPasses;
@@ -111,8 +106,8 @@ class PathIntegrator final : public Integrator {
     const LightQuery query{position, Vec3{}, true, path.state};
     const float u_choice = random.next_1d(), u_lobe = random.next_1d();
     const Vec2 u_light = random.next_2d(), u = random.next_2d();
-    add(sample_light_in_medium(context, medium, media, query, wo, mode, u_choice, u_light), path.state.depth + 1);
-    const auto next = medium.sample(wo, u, u_lobe);
+    add(sample_light_in_medium(context, event.medium, around, query, wo, mode, u_choice, u_light), path.state.depth + 1);
+    const auto next = event.medium.sample(wo, u, u_lobe);
     if (!next || !(next->pdf_dir > 0.0f)) return MediumStep::kEnds;
     const Rgb weight = next->value / next->pdf_dir;
     path.throughput *= weight;
@@ -132,10 +127,12 @@ class PathIntegrator final : public Integrator {
     Bsdf bsdf;
     bsdf.carry_subsurface(!context.lightmap);
     CameraPath path(camera);
-    Media media;  // that the path is in
-    const bool has_media = context.scene.has_volumes() && !context.lightmap;
+    static const Volumes kNone;
+    const bool has_media = !context.volumes.empty() && !context.lightmap;
+    Media media(has_media ? context.volumes : kNone);  // that the path is in
     if (has_media) media.begin_at(context.scene, path.ray.origin);
-    const Media* shading_media = has_media ? &media : nullptr;
+    Sampler within;
+    const Surroundings around{media, within};
     bool may_scatter = true;  // false past the bounce limit: the next surface only emits
 
     const int first_depth = context.lightmap ? context.lightmap->first_depth() : 0;
@@ -150,13 +147,14 @@ class PathIntegrator final : public Integrator {
       const auto hit = context.scene.intersect(path.ray, visibility);
 
       // Lamps do not block the ray.
+      if (has_media) within = sampler.fork(bounce + kWithin);
       if (!media.empty()) {
-        const MediumStep step =
-            go_through(context, media, path, hit ? hit->t : path.ray.t_max, mode, visibility, may_scatter, sampler, bounce, add);
+        const MediumStep step = go_through(context, around, path, hit ? hit->t : path.ray.t_max, mode, visibility, may_scatter, add);
         if (step == MediumStep::kEnds) break;
         if (step == MediumStep::kScatters) continue;
       } else {
-        add(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, mode, visibility), path.state.depth);
+        const auto all = [](float) { return Rgb(1.0f); };
+        add(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, mode, visibility, all), path.state.depth);
       }
       if (!hit) {
         add(path.leave(context, film, mode, result), path.state.depth);
@@ -184,7 +182,7 @@ class PathIntegrator final : public Integrator {
         return s_.direction_sampling == DirectionSampling::kBsdf ? e.pdf_dir : pdf_direction(bsdf, point, s_.direction_sampling, wi);
       };
       if (may_scatter) {
-        add(sample_direct_light(context, point, bsdf, mode, u_light_choice, u_light, pdf_of, shading_media), path.state.depth + 1);
+        add(sample_direct_light(context, point, bsdf, mode, u_light_choice, u_light, pdf_of, &around), path.state.depth + 1);
       }
 
       // Draw the next direction.
@@ -207,7 +205,7 @@ class PathIntegrator final : public Integrator {
         set_exit(*exit, bsdf);
         const float u_choice = below.next_1d(), u_exit = below.next_1d();
         const Vec2 u_to_light = below.next_2d(), u_out = below.next_2d();
-        add(sample_direct_light(context, point, bsdf, mode, u_choice, u_to_light, pdf_of, shading_media), path.state.depth + 1);
+        add(sample_direct_light(context, point, bsdf, mode, u_choice, u_to_light, pdf_of, &around), path.state.depth + 1);
         next = sample_direction(bsdf, point, s_.direction_sampling, u_out, u_exit);
         if (!next || !(next->pdf_dir > 0.0f)) break;
         path.throughput *= next->value / next->pdf_dir;
@@ -310,7 +308,7 @@ const Descriptor& path_descriptor() {
       /*bakes=*/true,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesSubsurface | kCarriesVolumes | kCarriesPortals};
+      kCarriesSubsurface | kCarriesAbsorption | kCarriesVolumes | kCarriesPortals};
   return descriptor;
 }
 

@@ -29,6 +29,7 @@ class WhittedIntegrator final : public Integrator {
       const uint32_t visibility = visibility_of(path.state.kind);
       const auto hit = context.scene.intersect(path.ray, visibility);
       result.radiance += path.throughput * lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, LightSampling::kOn, visibility);
+      path.absorb(context, hit ? hit->t : kInf);
       if (!hit) {
         result.radiance += path.throughput * path.leave(context, film, LightSampling::kOn, result);
         break;
@@ -86,7 +87,7 @@ const Descriptor& whitted_descriptor() {
       /*bakes=*/false,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesPortals};
+      kCarriesAbsorption | kCarriesPortals};
   return descriptor;
 }
 

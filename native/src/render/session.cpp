@@ -70,8 +70,10 @@ void Session::run() {
     ThreadPool pool(settings_.threads);
     scene_.resources().camera = &camera_;
     const LightSet lights(scene_);
+    const Volumes volumes(scene_, pool);
     const RenderContext context{scene_,
                                 lights,
+                                volumes,
                                 camera_,
                                 pool,
                                 settings_.seed,
@@ -112,6 +114,10 @@ void Session::run() {
       }
       if (enough(pass + 1, seconds, noise)) break;
     }
+    if (volumes.rays_given_up() > 0)
+      log_.say(std::to_string(volumes.rays_given_up()) +
+               " rays through volumes took too long to follow and ended black: somewhere a "
+               "volume is very thick beside where it is thin");
   } catch (const std::bad_alloc&) {
     error = "out of memory while rendering";
   } catch (const std::exception& e) {

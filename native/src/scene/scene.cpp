@@ -153,7 +153,7 @@ void Scene::build_accel(const std::string& embree, int threads) {
     uint32_t mask = i.data->visibility & 0xffffu;
     if (transparent && (mask & kRayShadow)) mask = (mask & ~uint32_t(kRayShadow)) | kTransparentShadowBit, any_transparent_ = true;
     for (const int program : i.data->materials)
-      if (data_.materials[size_t(program)].volume >= 0) mask |= kVolumeBit, has_volumes_ = true;
+      if (data_.materials[size_t(program)].volume >= 0) mask |= kVolumeBit;
     placed.push_back({i.mesh, i.world_space ? nullptr : &i.to_world, mask});
   }
   accel_ = gi::build_accel(embree, std::move(meshes), std::move(placed), threads);
@@ -368,7 +368,7 @@ int Scene::attribute(const ShadingPoint& point, int slot, float out[4]) const {
   out[0] = out[1] = out[2] = 0.0f, out[3] = 1.0f;
   if (point.instance == kNoId || size_t(slot) >= data_.attribute_names.size()) return 0;
   const Instance& placed = instances_[point.instance];
-  const int index = attribute_index_[placed.mesh][size_t(slot)];
+  const int index = point.inside ? -1 : attribute_index_[placed.mesh][size_t(slot)];
   if (index < 0) {
     for (const InstanceAttribute& a : placed.data->attributes) {
       if (a.name != data_.attribute_names[size_t(slot)]) continue;

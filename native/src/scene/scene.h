@@ -51,7 +51,6 @@ class Scene {
   Rgb transmittance(const Ray& ray, const PathState& path) const;
 
   // Surfaces of objects that are filled with something, along a ray: all of them, nearest first, whoever sees them.
-  bool has_volumes() const { return has_volumes_; }
   void volume_hits(const Ray& ray, std::vector<Hit>& hits) const { accel_->all_hits(ray, kVolumeBit, hits); }
   // Adds what fills an object of material `material` at `point`.
   void add_medium(int material, ShadingPoint& point, Medium& medium) const;
@@ -127,7 +126,7 @@ class Scene {
   std::unique_ptr<Accel> accel_;
   mutable std::array<RayCounter, kRayCounters> rays_;
   Bounds bounds_;
-  bool any_transparent_ = false, has_volumes_ = false;
+  bool any_transparent_ = false;
   static constexpr uint32_t kVolumeBit = 1u << 17;  // what objects that are filled answer to
 };
 

@@ -14,14 +14,28 @@ class Medium {
 
   // Takes `sigma_s` out of the beam and scatters it by Draine's phase function. What comes after the fourth is scattered as the fourth.
   void add_scattering(Rgb sigma_s, float g, float alpha) {
-    sigma_s = positive(sigma_s);
+    sigma_s = within_limits(sigma_s);
     sigma_t += sigma_s;
     if (is_black(sigma_s)) return;
     if (count_ == kMost) return void(lobes_[kMost - 1].sigma_s += sigma_s);
     lobes_[count_++] = {sigma_s, std::clamp(g, -0.999f, 0.999f), std::max(alpha, 0.0f)};
   }
-  void add_absorption(Rgb sigma_a) { sigma_t += positive(sigma_a); }
+  void add_absorption(Rgb sigma_a) { sigma_t += within_limits(sigma_a); }
+  void add(const Medium& other) {
+    sigma_t += other.sigma_t, emission += other.emission;
+    for (int i = 0; i < other.count_; ++i) {
+      if (count_ < kMost)
+        lobes_[count_++] = other.lobes_[i];
+      else
+        lobes_[kMost - 1].sigma_s += other.lobes_[i].sigma_s;
+    }
+  }
   bool scatters() const { return count_ > 0; }
+  Rgb scattering() const {  // σs of all lobes
+    Rgb sum;
+    for (int i = 0; i < count_; ++i) sum += lobes_[i].sigma_s;
+    return sum;
+  }
   bool empty() const { return is_black(sigma_t) && is_black(emission); }
 
   Rgb transmittance(float t) const {
@@ -71,6 +85,7 @@ class Medium {
     float g, alpha;
   };
   static constexpr int kMost = 4;
+  static Rgb within_limits(Rgb sigma) { return min(positive(sigma), Rgb(1e9f)); }
   // Henyey and Greenstein's part is drawn; where there is little of it, all directions alike.
   static bool is_flat(const Lobe& l) { return std::abs(l.g) < 0.05f; }
   static float drawn(float cosine, const Lobe& l) { return henyey_greenstein(cosine, is_flat(l) ? 0.0f : l.g); }

@@ -198,6 +198,35 @@ bool Program::uses(std::string_view name) const {
   return found;
 }
 
+bool Program::sees_path() const { return uses("ray_kind") || uses("ray_depth") || uses("ray_length"); }
+
+// What is alike all over the inside of an object; of attributes only the object's own are known there.
+constexpr const char* kUniformOps[] = {"object_location", "object_color", "object_index",  "object_random", "attribute",
+                                       "has_attribute",   "uv",           "ray_kind",      "ray_length",    "ray_depth",
+                                       "normal",          "true_normal",  "object_normal", "incoming",      "object_incoming",
+                                       "backfacing",      "parametric"};
+
+bool Program::varies_in_space() const {
+  bool varies = false;
+  for_each_instruction(code_, [&](size_t, const Instruction& i) {
+    const auto is_op = [&](std::string_view name) { return name == i.op.name; };
+    varies = varies || (i.op.kind == OpKind::kContext && std::none_of(std::begin(kUniformOps), std::end(kUniformOps), is_op));
+  });
+  return varies;
+}
+
+bool Program::only_absorbs() const {
+  bool only = true;
+  for_each_instruction(code_, [&](size_t, const Instruction& i) {
+    if (std::string_view(i.op.name) != "volume_coefficients") return;
+    for (const int input : {2, 3}) {  // what it scatters and emits
+      const size_t slot = size_t(i.operands[input]);
+      only = only && slot < constants_.size() && std::all_of(&constants_[slot], &constants_[slot] + 3, [](float x) { return x == 0.0f; });
+    }
+  });
+  return only;
+}
+
 uint8_t Program::effects_of_ops() const {
   uint8_t effects = 0;
   for_each_instruction(code_, [&](size_t, const Instruction& i) { effects |= i.op.effects; });

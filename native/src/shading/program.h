@@ -104,6 +104,12 @@ class Program {
   bool may_mirror() const { return effects_ & kMayMirror; }  // whether a lobe of it may be perfectly smooth
   // Whether its lobes may depend on where the surface is seen from, or on how it came to be seen.
   bool sees_view() const { return sees_view_; }
+  // Whether it looks at the kind of ray that asks, or how many there were before.
+  bool sees_path() const;
+  // Whether what it gives may be another thing elsewhere in the same object.
+  bool varies_in_space() const;
+  // Of a volume's: whether it neither scatters nor glows, whatever values it works with.
+  bool only_absorbs() const;
   bool empty() const { return code_.empty(); }
   // Immediate `index` of every call of op `name`: what the program will ask of its surroundings.
   std::vector<int32_t> immediates(std::string_view name, int index) const;

@@ -35,6 +35,7 @@ struct ShadingPoint {
   Vec3 wo;             // unit, towards where the ray came from
   Vec3 ng, ns;         // geometric and interpolated normal, unit, both turned towards wo
   bool backfacing = false;
+  bool inside = false;   // within a volume: what the mesh knows of its surface is not asked
   Vec3 object_position;  // in the instance's own space
   uint32_t instance = kNoId, mesh = kNoId, triangle = kNoId;  // kNoId on the world and on lamps
   float b1 = 0, b2 = 0;  // barycentrics of the triangle's 2nd and 3rd corner

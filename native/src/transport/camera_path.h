@@ -98,6 +98,9 @@ struct CameraPath {
 
   float footprint(const CameraRay& camera, const Hit& hit) const { return camera.footprint + camera.spread * (travelled + hit.t); }
 
+  // The way to a surface at t, or to nowhere: what volumes that only absorb take. For integrators that carry no others.
+  void absorb(const RenderContext& context, float t) { throughput *= passed_by_absorbers(context, ray, t, state); }
+
   // The ray leaves the scene: suns and the world, or a hole in the picture where the film is transparent. Returns radiance.
   LightBeyond leave(const RenderContext& context, const Film& film, LightSampling mode, PixelSample& sample) const {
     if (seen_from_camera && film.spec().transparent) {

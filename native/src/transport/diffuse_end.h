@@ -39,6 +39,7 @@ inline Rgb meet_light(const RenderContext& context, const BounceLimits& limits, 
   do {
     const auto hit = context.scene.intersect(ray, visibility);
     found += throughput * lamps_along(context, ray, hit ? hit->t : kInf, origin, kMode, visibility);
+    throughput *= passed_by_absorbers(context, ray, hit ? hit->t : kInf, state);
     if (!hit) return found + throughput * light_beyond(context, ray, origin, kMode, state);
     ShadingPoint met = context.scene.shading_point(ray, *hit, state);
     found += throughput * surface_emission(context, met, context.scene.emission(met), origin, kMode);
@@ -81,6 +82,7 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
     const auto hit = context.scene.intersect(path.ray, visibility);
     const int depth = path.state.depth;
     if (!known) add_met(lamps_along(context, path.ray, hit ? hit->t : kInf, path.origin, kMode, visibility));
+    path.absorb(context, hit ? hit->t : kInf);
     if (!hit) {
       if (!known) add_met(path.leave(context, film, kMode, result));
       break;

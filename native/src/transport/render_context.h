@@ -12,6 +12,7 @@
 #include "scene/camera.h"
 #include "scene/scene.h"
 #include "transport/lightmap.h"
+#include "transport/volumes.h"
 
 namespace gi {
 
@@ -65,6 +66,7 @@ class Log {
 struct RenderContext {
   const Scene& scene;
   const LightSet& lights;
+  const Volumes& volumes;
   const Camera& camera;
   ThreadPool& pool;
   uint32_t seed = 0;

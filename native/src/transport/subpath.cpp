@@ -68,6 +68,7 @@ Rgb passage(const RenderContext& context, Ray ray, uint32_t visibility, PathStat
   Rgb passed(1.0f);
   for (int layers = 0; layers <= transparent_limit; ++layers) {
     const auto hit = context.scene.intersect(ray, visibility);
+    passed *= passed_by_absorbers(context, ray, hit ? hit->t : ray.t_max, path);
     if (!hit) return passed;
     ShadingPoint point = context.scene.shading_point(ray, *hit, path);
     passed *= context.scene.transparency(point);
@@ -106,6 +107,7 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     const auto hit = context.scene.intersect(ray, kIndirect);
     if (!hit) return;
     const uint32_t visible = context.scene.instances()[hit->instance].data->visibility;
+    passed *= passed_by_absorbers(context, ray, hit->t, state);
     LightVertex& v = vertices.grow();
     v.point = context.scene.shading_point(ray, *hit, state);
     if (carried.is_first() && !(visible & kRayShadow)) {  // throws no shadow: the light goes on as if nothing were there
