@@ -57,6 +57,8 @@ def embree_path() -> str:
     raise NativeMissing(f"no Embree library beside {package}: reinstall the package embreex")
 
 
-def build_scene(scene, threads: int = 0):
-    """The native scene of a scene_data.Scene. Raises ValueError naming what is wrong with it."""
-    return module().Scene(scene, embree=embree_path(), threads=threads)
+def build_scene(scene, threads: int = 0, movable: bool = False, before=None):
+    """The native scene of a scene_data.Scene. Raises ValueError naming what is wrong with it.
+
+    `movable`: for a scene that is edited; what `before`, one like it, made of the same Mesh objects serves again."""
+    return module().Scene(scene, embree=embree_path(), threads=threads, movable=movable, before=before)

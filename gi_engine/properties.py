@@ -144,6 +144,7 @@ VIEWED = (
     ("Normal", "Normal", "Where the surface faces"),
     ("Denoising Albedo", "Albedo", "Share of light that the surface reflects or transmits"),
     ("Cache Samples", "Cache Samples", "Irradiance caching: where the records lie"),
+    ("Photons", "Photons", "Photon mapping: how many lie in the pixel"),
     ("Photon Density", "Photon Density", "Photon mapping: photons on a square metre"),
 )
 

@@ -20,7 +20,8 @@ from .scene_data import Camera, Film, Scene, Settings
 from .session import RenderFailed, Session
 
 FIRST_PIXELS = 12_000  # of the first picture after a change: as many as are traced before it feels slow
-POLL_SECONDS = 0.01
+FIRST_SECONDS = 0.1  # that caches may take of it, twice: what they do not know by then is path traced
+POLL_SECONDS = 0.005
 
 
 @dataclass
@@ -52,13 +53,14 @@ class Refiner:
         self.redraw, self.denoiser = redraw, denoiser
         self.picture: Picture | None = None
         self.error = ""
+        self.stage = ""  # what is done while no picture comes
         self.warnings: list[str] = []
         self.starts = 0  # how often a picture was begun
         self._wish: Job | None = None
         self._closed = False
         self._wake = threading.Condition()
         self._built: tuple | None = None  # the Scene, and what the native side made of it
-        self._kept: dict = {}
+        self._last: Session | None = None  # which knows of light in the scene, by caches and photons
         self._thread = threading.Thread(target=self._run, name="GI Engine viewport", daemon=True)
         self._thread.start()
 
@@ -75,7 +77,7 @@ class Refiner:
             self._wake.notify()
         if threading.current_thread() is not self._thread:
             self._thread.join()
-        self._built = None
+        self._forget()
 
     def _run(self) -> None:
         while not self._closed:
@@ -89,9 +91,12 @@ class Refiner:
                 self.error = ""
                 self._refine(job)
             except (native.NativeMissing, RenderFailed, ValueError, RuntimeError, MemoryError) as error:
-                self.error = str(error) or "out of memory"
+                self.error, self._last = str(error) or "out of memory", None
                 self._tell()
-        self._built = None
+        self._forget()
+
+    def _forget(self) -> None:
+        self._last = self._built = None
 
     def _outdated(self) -> bool:
         return self._closed or self._wish is not None
@@ -102,21 +107,24 @@ class Refiner:
 
     def _refine(self, job: Job) -> None:
         if self._built is None or self._built[0] is not job.scene:
-            self._built, self._kept = None, {}
-            self._built = (job.scene, native.build_scene(job.scene, job.settings.threads))
-            self.warnings = list(self._built[1].warnings)
+            before, self._last = self._built and self._built[1], None
+            built = native.build_scene(job.scene, job.settings.threads, movable=True, before=before)
+            self._built = (job.scene, built)
+            self.warnings = list(built.warnings)
         started = time.monotonic()
-        for scale in scales(job.film):
+        for number, scale in enumerate(scales(job.film)):
             samples = job.settings.samples if scale == 1 else 1
-            if not self._stage(job, scale, samples, started):
+            if not self._stage(job, scale, samples, started, FIRST_SECONDS if number == 0 and scale > 1 else 0.0):
                 return
 
-    def _stage(self, job: Job, scale: int, samples: int, started: float) -> bool:
+    def _stage(self, job: Job, scale: int, samples: int, started: float, limit: float) -> bool:
         """One session at 1/scale of the resolution. False where something newer is wanted."""
         threads = job.settings.threads or max(1, (os.cpu_count() or 2) - 1)  # one is left to the window
-        settings = dataclasses.replace(job.settings, samples=samples, threads=threads, time_limit=0.0, noise_target=0.0)
+        settings = dataclasses.replace(
+            job.settings, samples=samples, threads=threads, time_limit=2 * limit, noise_target=0.0
+        )
         scene = dataclasses.replace(job.scene, camera=job.camera, film=reduced(job.film, scale))
-        session = Session(scene, settings, built=self._built[1], kept=self._kept.get(settings.integrator))
+        session = self._last = Session(scene, settings, built=self._built[1], earlier=self._knowing(settings))
         shown, clean_at = 0, job.start_sample
         with session:
             while True:
@@ -127,6 +135,7 @@ class Refiner:
                 progress = session.progress()
                 if progress["error"]:
                     raise RenderFailed(progress["error"])
+                self._note(progress["stage"])
                 if progress["passes"] > shown:
                     shown = progress["passes"]
                     clean = scale == 1 and (shown >= clean_at or shown == samples)
@@ -134,11 +143,22 @@ class Refiner:
                     self._publish(session, job, shown if scale == 1 else 0, time.monotonic() - started, clean)
                 if done:
                     break
-        with contextlib.suppress(ValueError):
-            kept = session.native.kept()
-            if kept and job.settings.keep:
-                self._kept[settings.integrator] = kept
         return not self._outdated()
+
+    def _note(self, stage: str) -> None:
+        """Passes on what the integrator is at, without what it counts meanwhile."""
+        stage = stage.split(",")[0]
+        if stage != self.stage:
+            self.stage = stage
+            self._tell()
+
+    def _knowing(self, settings: Settings) -> Session | None:
+        """The last session, if what it worked out serves this one: it was perhaps stopped on its way, by a camera that moved."""
+        last, self._last = self._last, None
+        if last is None or not settings.keep:
+            return None
+        alike = (last.settings.integrator, last.settings.parameters) == (settings.integrator, settings.parameters)
+        return last if alike else None
 
     def _publish(self, session: Session, job: Job, samples: int, seconds: float, clean: bool) -> None:
         pixels = session.read(job.shown)

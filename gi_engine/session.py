@@ -26,13 +26,16 @@ class Session:
         kept=None,
         path=(),
         steady=False,
+        earlier=None,
     ):
-        """`kept`: tables that a session like this one kept, to be used as they are where it is `steady`; `path`: Cameras of
+        """`earlier`: a Session of the same scene and integrator that has ended, whose work serves on; `kept`: tables that a session like this one kept, to be used as they are where it is `steady`; `path`: Cameras of
         other frames."""
-        self.scene = scene
+        self.scene, self.settings = scene, settings
         try:
             self.native_scene = built or native.build_scene(scene, settings.threads)
             self.native = native.module().Session(self.native_scene, scene.camera, scene.film, settings, lightmap)
+            if earlier:
+                self.native.continue_from(earlier.native)
             if kept:
                 self.native.take_over(kept)
             self.native.look_along(list(path))

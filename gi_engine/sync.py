@@ -1,159 +1,266 @@
-"""A viewport's scene, kept up to date: what Blender says has changed is exported anew, meshes that have not changed are not read again.
-Leaves out the camera, which each drawing brings along."""
+"""A viewport's scene, kept up to date in two phases: what Blender says has changed is tagged, then just that is read anew; what is gone is
+swept. Leaves out the camera, which each drawing brings along."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
 from . import native
-from .content import digest
-from .export import Exported, export
-from .export.film import frame_size
-from .export.settings import export_settings
+from .export import Exported, export, export_luminaires, finish, read_mesh
+from .export.film import export_film, frame_size
+from .export.images import release_scratch
+from .export.objects import Walk, usable
+from .export.settings import export_settings, resolve
+from .export.shaders import Shaders
+from .export.warnings import Warnings
+from .known import Changed, KnownScene
+from .sameness import same_scene
+from .scene_data import Scene
 
-# What each kind of ID changes. Of objects, Blender says itself whether their geometry or their place has.
+# What each kind of ID changes; all others, what objects there are.
 KINDS = (
     (bpy.types.Camera, "camera"),
     (bpy.types.Light, "light"),
     (bpy.types.World, "world"),
     ((bpy.types.Material, bpy.types.NodeTree, bpy.types.Image, bpy.types.Texture), "material"),
-    ((bpy.types.Mesh, bpy.types.Curve, bpy.types.MetaBall), "geometry"),
+    ((bpy.types.Mesh, bpy.types.Key), "mesh"),
     (bpy.types.Scene, "settings"),
     ((bpy.types.Collection, bpy.types.ViewLayer), "objects"),
 )
-NOT_IN_THE_SCENE = {"camera", "settings"}
+OWNERS = (bpy.types.Material, bpy.types.Light, bpy.types.World)  # of programs
+# What is read without going through all objects.
+ONE_BY_ONE = {"light", "lamp", "material", "world", "camera", "settings", "object", "mesh"}
+
+
+def kind_of(update) -> set[str]:
+    item = update.id
+    if not isinstance(item, bpy.types.Object):
+        return {next((kind for types, kind in KINDS if isinstance(item, types)), "objects")}
+    if item.type == "CAMERA":
+        return {"camera"}
+    if item.type == "LIGHT":
+        return {"lamp"}
+    return {"object" if item.type == "MESH" else "objects"}
 
 
 def changes_of(depsgraph) -> set[str]:
     """Kinds of change since the depsgraph was last asked."""
-    found = set()
+    return set().union(*(kind_of(update) for update in depsgraph.updates))
+
+
+def tag(depsgraph, frame_is_new: bool) -> Changed:
+    """Which parts of what is known hold no more."""
+    changed = Changed(every_program=frame_is_new)
+    owners = trees = False
     for update in depsgraph.updates:
-        item = update.id
-        if isinstance(item, bpy.types.Object):
-            found |= changes_of_object(item, update)
-        else:
-            found.add(next((kind for types, kind in KINDS if isinstance(item, types)), "objects"))
-    return found
-
-
-def changes_of_object(item, update) -> set[str]:
-    if item.type == "CAMERA":
-        return {"camera"}
-    found = {"objects"}  # shown, hidden, its settings
-    if update.is_updated_geometry:
-        found.add("geometry")
-    if update.is_updated_transform:
-        found.add("transform")
-    return found
+        item, uid = update.id, update.id.original.session_uid
+        if update.is_updated_geometry:
+            changed.geometry.add(uid)
+        if isinstance(item, OWNERS):
+            changed.shading.add(uid)
+            owners = True
+        elif isinstance(item, bpy.types.NodeTree):
+            trees = True
+            changed.every_program |= not item.original.is_embedded_data  # a group's users are not always named
+        elif isinstance(item, bpy.types.Image):
+            changed.images.add(uid)
+            changed.every_program = True
+        elif not isinstance(item, bpy.types.Object | bpy.types.Mesh | bpy.types.Camera):
+            changed.every_program |= isinstance(item, bpy.types.Texture | bpy.types.Text)
+    changed.every_program |= trees and not owners
+    return changed
 
 
 @dataclass
-class Known:
-    """A mesh as it was exported."""
+class Objects:
+    """What going through the objects gave, without anything that Blender may take away."""
 
-    wanted: frozenset
-    deformed: bool
-    size: tuple
-    owner: int
-    mesh: object
-
-
-class KnownMeshes:
-    """Exported meshes, by the evaluated mesh they were read from. Blender may put another mesh where one was, so that one whose object or
-    data was evaluated anew is never taken from here."""
-
-    def __init__(self):
-        self.known: dict[int, Known] = {}
-        self.used: set[int] = set()
-        self.changed: set[int] = set()  # session_uid of objects and data
-        self.reads = 0
-
-    def begin(self, depsgraph) -> None:
-        self.used = set()
-        self.changed = {u.id.original.session_uid for u in depsgraph.updates if u.is_updated_geometry}
-
-    def read(self, prototype, wanted: set[str], make):
-        mesh, owner = prototype.mesh, prototype.object.original
-        data = owner.data.session_uid if owner.data else 0
-        key, names = mesh.as_pointer(), frozenset(wanted)
-        size = (len(mesh.vertices), len(mesh.polygons), len(mesh.loops), mesh.name)
-        found = self.known.get(key)
-        wish = Known(names, prototype.is_deformed, size, owner.session_uid, None)
-        fresh = {owner.session_uid, data, prototype.parent.original.session_uid} & self.changed
-        if (
-            not found
-            or fresh
-            or (found.wanted, found.deformed, found.size, found.owner)
-            != (
-                wish.wanted,
-                wish.deformed,
-                wish.size,
-                wish.owner,
-            )
-        ):
-            wish.mesh = make()
-            self.reads += 1
-            found = self.known[key] = wish
-        self.used.add(key)
-        return found.mesh and dataclasses.replace(found.mesh, name=prototype.name)
-
-    def sweep(self) -> None:
-        self.known = {key: found for key, found in self.known.items() if key in self.used}
+    own: dict[
+        int, int
+    ]  # prototype of each object that is its own only instance, by session_uid; empty where there are duplicates
+    looks: list[tuple]  # by prototype: what but matrix and mesh goes into its instance
+    materials: list[list[int]]  # by prototype and slot: session_uid, 0 for none
+    instances: list  # by prototype
+    lights: list[tuple]  # name, session_uid of the lamp, matrix, visibility, session_uid of the object or 0
+    warnings: list[str]
 
 
 class Sync:
-    """Holds what a viewport shows. `exports` counts whole exports."""
+    """Holds what a viewport shows. `walks` counts how often all objects were gone through."""
 
     def __init__(self):
         self.exported: Exported | None = None
-        self.meshes = KnownMeshes()
-        self.exports = 0
-        self._digest = ""
+        self.known = KnownScene()
+        self.walks = 0
+        self._objects: Objects | None = None
         self._frame: tuple = ()
+
+    def is_stale(self, depsgraph) -> bool:
+        """Whether something has changed that Blender may have said nothing of."""
+        return self.exported is None or frame_of(depsgraph) != self._frame
 
     def update(self, depsgraph, view=None) -> bool:
         """Takes over what has changed; True where the picture has to begin anew. `view`: the 3D viewport, for local view.
 
         Raises ExportError."""
-        changes = changes_of(depsgraph)
-        if self.exported and not changes - {"camera"}:
+        changes, frame = changes_of(depsgraph), frame_of(depsgraph)
+        before, frame_is_new = self.exported, frame != self._frame
+        stands = before and not frame_is_new and not self.known.programs.look_elsewhere
+        if stands and not changes - {"camera"}:
             return False
-        if self.exported and not changes - NOT_IN_THE_SCENE:
-            # The scene's own settings come with any change of it, the frame's and the simplification's included.
-            before = (self.exported.settings, self._frame)
-            if self._frame == frame_of(depsgraph):
-                self.exported.settings = self.settings(depsgraph)
-                return before[0] != self.exported.settings
-        self.meshes.begin(depsgraph)
+        if stands and not changes - {"camera", "settings"}:
+            # The scene's own settings come with any change of it.
+            old, before.settings = before.settings, self.settings(depsgraph)
+            return old != before.settings
+        layer = depsgraph.view_layer_eval
+        film = export_film(
+            depsgraph.scene_eval, layer, resolve(depsgraph.scene_eval, layer), frame_size(depsgraph.scene_eval.render)
+        )
+        if frame[:2] != self._frame[:2]:
+            self.known = KnownScene()  # another depsgraph, which tells of its own
+        self.known.begin(tag(depsgraph, frame_is_new), film.aovs)
+        shaded = before and not frame_is_new and not changes - ONE_BY_ONE and self.shade(depsgraph, film)
+        exported = shaded or self.walk(depsgraph, view)
+        self.known.sweep(meshes=not shaded)
+        self._frame = frame
+        if before and same_scene(exported.scene, before.scene):
+            exported.scene = before.scene  # what was built of it still stands
+            self.exported = exported
+            return exported.settings != before.settings
+        self.exported = exported
+        return True
+
+    def walk(self, depsgraph, view) -> Exported:
+        """Goes through all objects."""
+        self.walks += 1
+        self.known.start_over()
         size = frame_size(depsgraph.scene_eval.render)
-        exported = export(depsgraph, native.integrators(), None, size, known=self.meshes, view=view, needs_camera=False)
-        self.meshes.sweep()
-        self.exports += 1
-        self._frame = frame_of(depsgraph)
-        mark = mark_of(exported)
-        same = mark == self._digest and self.exported is not None and exported.settings == self.exported.settings
-        if mark == self._digest and self.exported:
-            exported.scene = self.exported.scene  # what was built of it still stands
-        self.exported, self._digest = exported, mark
-        return not same
+        found = export(depsgraph, native.integrators(), None, size, known=self.known, view=view, needs_camera=False)
+        walked, found.walked = found.walked, None
+        prototypes = walked.found.prototypes
+        self._objects = Objects(
+            {} if any(p.randoms for p in prototypes) else {uid_of(p.object): k for k, p in enumerate(prototypes)},
+            [look_of(p) for p in prototypes],
+            [[uid_of(material) for material in p.materials] for p in walked.found.prototypes],
+            walked.instances or [None] * len(walked.found.prototypes),
+            [(n, uid_of(light), matrix, seen, uid_of(item)) for n, light, matrix, seen, item in walked.found.lights],
+            walked.warnings,
+        )
+        return found
+
+    def shade(self, depsgraph, film) -> Exported | None:
+        """Reads materials, lamps and the world alone; None where that is not enough."""
+        old, known = self.exported.scene, self._objects
+        warnings, out = Warnings(), Scene(camera=old.camera, film=film)
+        walk = Walk(depsgraph.view_layer_eval, warnings)
+        lights = self.lights(depsgraph, walk)
+        bent = self.move(depsgraph, walk) if lights is not None else None
+        if bent is None:
+            return None
+        shaders = Shaders(out, depsgraph, warnings, self.known)
+        export_luminaires(out, depsgraph, lights, shaders, warnings)
+        if depsgraph.view_layer_eval.use_solid:
+            materials = evaluated(bpy.data.materials, depsgraph)
+            slots = [[shaders.material(materials[uid] if uid else None) for uid in row] for row in known.materials]
+            pairs = zip(known.instances, slots, strict=True)
+            out.instances = [replaced(instance, row) for instance, row in pairs if instance]
+        if out.attribute_names != old.attribute_names:
+            return None  # meshes have to bring others
+        out.meshes = list(old.meshes)
+        for at, prototype in bent:
+            mesh = read_mesh(prototype, shaders.wanted_attributes(), self.known.meshes)
+            if mesh is None:
+                return None
+            out.meshes[at] = mesh
+        release_scratch()
+        settings = self.settings(depsgraph)
+        messages = known.warnings + [text for text in warnings.messages() if text not in known.warnings]
+        return finish(Exported(out, settings, messages), depsgraph, native.integrators())
+
+    def move(self, depsgraph, walk: Walk) -> list[tuple] | None:
+        """Puts objects where they are now. Returns the meshes to be read again, as index and prototype; None where more may have changed
+        than an object's place and a mesh that it alone has."""
+        known, bent = self._objects, []
+        users = Counter(instance.mesh for instance in known.instances if instance)
+        for update in depsgraph.updates:
+            item = update.id
+            if not isinstance(item, bpy.types.Object) or item.type in {"CAMERA", "LIGHT"}:
+                continue
+            at = known.own.get(uid_of(item))
+            instance = None if at is None else known.instances[at]
+            if instance is None or instance.attributes or item.is_instancer:
+                return None
+            prototype = walk.add_prototype(item, item, item, item.data)
+            if prototype is None or look_of(prototype) != known.looks[at]:
+                return None
+            if update.is_updated_geometry:
+                if users[instance.mesh] > 1 or not prototype.is_plain:
+                    return None
+                bent.append((instance.mesh, prototype))
+            matrix = np.array(item.matrix_world, np.float32)
+            if not usable(matrix[None])[0]:
+                return None
+            if not np.array_equal(matrix, instance.matrix):
+                known.instances[at] = dataclasses.replace(instance, matrix=matrix)
+        return bent
+
+    def lights(self, depsgraph, walk: Walk) -> list[tuple] | None:
+        """The lamps as they are now, those that moved where they are now; None where others may have come or gone."""
+        moved = {
+            u.id.original.session_uid: u.id
+            for u in depsgraph.updates
+            if isinstance(u.id, bpy.types.Object) and u.id.type == "LIGHT"
+        }
+        if moved and not all(item for *_, item in self._objects.lights):
+            return None  # duplicates may be of those
+        lamps = evaluated(bpy.data.lights, depsgraph)
+        found = []
+        for at, (name, lamp, matrix, seen, item) in enumerate(self._objects.lights):
+            if item in moved:
+                place = moved.pop(item)
+                if place.name != name or place.is_instancer or uid_of(place.data) != lamp:
+                    return None
+                matrix, seen = np.array(place.matrix_world, np.float32), walk.visibility(place, place)
+                self._objects.lights[at] = (name, lamp, matrix, seen, item)
+            if lamp not in lamps:
+                return None
+            found.append((name, lamps[lamp], matrix, seen))
+        return None if moved else found
 
     def settings(self, depsgraph):
         return export_settings(depsgraph.scene_eval, depsgraph.view_layer_eval, native.integrators())
 
 
+def look_of(prototype) -> tuple:
+    settings = {
+        f.name: getattr(prototype, f.name)
+        for f in dataclasses.fields(prototype)
+        if f.name not in {"mesh", "materials", "object", "parent", "matrices", "randoms"}
+    }
+    return [uid_of(material) for material in prototype.materials], settings
+
+
+def uid_of(item) -> int:
+    return item.original.session_uid if item else 0
+
+
+def evaluated(items, depsgraph) -> dict:
+    return {item.session_uid: item.evaluated_get(depsgraph) for item in items}
+
+
+def replaced(instance, materials: list[int]):
+    return instance if instance.materials == materials else dataclasses.replace(instance, materials=materials)
+
+
 def frame_of(depsgraph) -> tuple:
-    """What of a scene's own data changes what is exported."""
-    scene = depsgraph.scene_eval
+    """What of a scene's and a view layer's own data changes what is exported: Blender says no more than that something of them has."""
+    scene, layer = depsgraph.scene_eval, depsgraph.view_layer_eval
     render = scene.render
-    return scene.frame_current, scene.frame_subframe, render.use_simplify, render.simplify_subdivision, str(scene.world)
-
-
-def mark_of(exported: Exported) -> str:
-    """Tells whether two exports hold the same scene; camera and film do not count."""
-    scene = exported.scene
-    return digest(
-        scene.meshes, scene.instances, scene.lights, scene.programs, scene.images, scene.attribute_names, scene.world
-    )
+    overrides = uid_of(layer.material_override), uid_of(getattr(layer, "world_override", None)), uid_of(scene.world)
+    frame = scene.frame_current, scene.frame_subframe, render.use_simplify, render.simplify_subdivision
+    return (uid_of(scene), layer.name, *frame, *overrides, layer.use_sky, layer.use_solid)

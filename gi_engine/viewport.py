@@ -44,7 +44,7 @@ class Viewport:
             self.failure = str(error)
 
     def draw(self, engine, context, depsgraph) -> None:
-        if self.sync.exported is None:
+        if self.sync.is_stale(depsgraph):
             self.update(context, depsgraph)
         if self.sync.exported:
             self.submit(self.wanted(context, depsgraph))
@@ -95,10 +95,11 @@ class Viewport:
             return error or "Preparing"
         settings = self.job.settings
         name = next((d["label"] for d in native.integrators() if d["id"] == settings.integrator), settings.integrator)
+        stage = self.refiner.stage and f" | {self.refiner.stage.capitalize()}"
         if picture is None:
-            return f"{name} | Preparing"
+            return f"{name} | Preparing{stage}"
         paused = " | Paused" if self.job.paused else ""
-        return f"{name} | Sample {picture.samples}/{settings.samples} | {picture.seconds:.1f} s{paused}"
+        return f"{name} | Sample {picture.samples}/{settings.samples} | {picture.seconds:.1f} s{stage}{paused}"
 
 
 def make_job(exported, camera, film: Film, own, resolved) -> Job:

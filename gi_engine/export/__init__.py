@@ -5,17 +5,17 @@ Everything is read here, while Blender's data holds still; nothing is read while
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from .. import approximations
-from ..scene_data import Camera, Scene, Settings
+from ..scene_data import Camera, Instance, Scene, Settings
 from .camera import export_camera
 from .film import export_film, frame_size
 from .images import release_scratch
 from .lights import export_light
-from .mesh import export_mesh
+from .mesh import export_mesh, readable
 from .objects import Collected, collect, place
 from .places import read_places
 from .settings import export_settings, resolve, unheeded
@@ -33,10 +33,20 @@ WITHOUT = {
 
 
 @dataclass
+class Walked:
+    """What going through the depsgraph's objects gave."""
+
+    found: Collected
+    instances: list[Instance | None] = field(default_factory=list)  # by prototype
+    warnings: list[str] = field(default_factory=list)
+
+
+@dataclass
 class Exported:
     scene: Scene
     settings: Settings
     warnings: list[str]
+    walked: Walked | None = None  # holds Blender's data, which is gone once the depsgraph is evaluated again
 
 
 class ExportError(ValueError):
@@ -57,36 +67,51 @@ def export(
     """`descriptors`: the integrators'. `engine`: the RenderEngine, where there is one (stereo, camera override).
 
     `size` is the full frame's in pixels; by default the scene's. `integrator` overrides the scene's.
-    `lightmap`: the UV map that a bake is for; it needs no camera. Of a viewport: `known` meshes (sync.py) are not read again, and
+    `lightmap`: the UV map that a bake is for; it needs no camera. Of a viewport: what is `known` (sync.py) is not read again, and
     only what the 3D viewport `view` shows is taken.
     """
-    warnings = Warnings()
     scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer_eval
     width, height = size or frame_size(scene.render)
-    out = Scene()
+    warnings, out = Warnings(), Scene()
     if (lightmap or not needs_camera) and not scene.camera:
         out.camera = Camera("none", "ORTHO", np.eye(4, dtype=np.float32))
     else:
         out.camera = export_active_camera(engine, depsgraph, width, height, warnings)
     out.film = export_film(scene, view_layer, resolve(scene, view_layer), (width, height))
-    found = collect(depsgraph, warnings, view)
-    shaders = Shaders(out, depsgraph, warnings)
-    world = (getattr(view_layer, "world_override", None) or scene.world) if view_layer.use_sky else None
-    out.world = export_world(world, shaders.world(world) if world else -1)
-    export_lights(out, found, shaders, warnings)
+    walked = Walked(collect(depsgraph, of_objects := Warnings(), view))
+    shaders = Shaders(out, depsgraph, warnings, known)
+    export_luminaires(out, depsgraph, walked.found.lights, shaders, warnings)
     if view_layer.use_solid:
-        export_objects(out, found, depsgraph, shaders, warnings, {lightmap} - {""}, known)
+        export_objects(out, walked, depsgraph, shaders, of_objects, {lightmap} - {""}, known and known.meshes)
+    walked.warnings = of_objects.messages()
     if scene.render.use_motion_blur:
         warnings.add("motion blur is not supported yet; rendered without")
     release_scratch()
     settings = export_settings(scene, view_layer, descriptors, integrator)
-    chosen = next((d for d in descriptors if d["id"] == settings.integrator), None)
+    messages = walked.warnings + [text for text in warnings.messages() if text not in walked.warnings]
+    exported = Exported(out, settings, messages, walked if known else None)
+    return finish(exported, depsgraph, descriptors)
+
+
+def finish(exported: Exported, depsgraph, descriptors: list[dict]) -> Exported:
+    """What settings and materials together are to be warned of."""
+    chosen = next((d for d in descriptors if d["id"] == exported.settings.integrator), None)
+    warnings = Warnings()
     if chosen:
-        warn_of_needs(out, chosen, warnings)
-        for text in unheeded(scene, chosen):
+        warn_of_needs(exported.scene, chosen, warnings)
+        for text in unheeded(depsgraph.scene_eval, chosen):
             warnings.add(text)
-    approximations.note(out.programs)
-    return Exported(out, settings, warnings.messages())
+    exported.warnings += warnings.messages()
+    approximations.note(exported.scene.programs)
+    return exported
+
+
+def export_luminaires(out: Scene, depsgraph, lights: list[tuple], shaders: Shaders, warnings: Warnings) -> None:
+    """The world and the lamps."""
+    scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer_eval
+    world = (getattr(view_layer, "world_override", None) or scene.world) if view_layer.use_sky else None
+    out.world = export_world(world, shaders.world(world) if world else -1)
+    export_lights(out, lights, shaders, warnings)
 
 
 def warn_of_needs(out: Scene, chosen: dict, warnings: Warnings) -> None:
@@ -108,8 +133,8 @@ def export_active_camera(engine, depsgraph, width: int, height: int, warnings: W
         raise ExportError(str(error)) from error
 
 
-def export_lights(out: Scene, found: Collected, shaders: Shaders, warnings: Warnings) -> None:
-    for name, light, matrix, visibility in found.lights:
+def export_lights(out: Scene, lights: list[tuple], shaders: Shaders, warnings: Warnings) -> None:
+    for name, light, matrix, visibility, *_ in lights:
         lamp = export_light(name, light, matrix, visibility, shaders.light(light))
         if lamp:
             out.lights.append(lamp)
@@ -118,8 +143,9 @@ def export_lights(out: Scene, found: Collected, shaders: Shaders, warnings: Warn
 
 
 def export_objects(
-    out: Scene, found: Collected, depsgraph, shaders: Shaders, warnings: Warnings, attributes: set[str], known=None
+    out: Scene, walked: Walked, depsgraph, shaders: Shaders, warnings: Warnings, attributes: set[str], known=None
 ) -> None:
+    found = walked.found
     # Programs first: they say which attributes the meshes have to bring.
     slots = [shaders.slots(prototype.materials) for prototype in found.prototypes]
     wanted = shaders.wanted_attributes() | attributes
@@ -134,14 +160,12 @@ def export_objects(
     values = [shaders.object_attributes(prototype) for prototype in found.prototypes]
     for value, own in zip(values, read_places(depsgraph, found.prototypes, wanted), strict=True):
         value.update(own)
-    out.instances = place(found, meshes, slots, values, warnings)
+    walked.instances = place(found, meshes, slots, values, warnings)
+    out.instances = [instance for instance in walked.instances if instance]
 
 
 def add_mesh(out: Scene, prototype, wanted: set[str], warnings: Warnings, known=None) -> int | None:
-    def read():
-        return export_mesh(prototype.mesh, prototype.name, wanted, prototype.is_deformed)
-
-    mesh = known.read(prototype, wanted, read) if known else read()
+    mesh = read_mesh(prototype, wanted, known)
     if mesh is None:
         # Instancers and curves without a fill have no faces on purpose.
         if prototype.is_plain:
@@ -149,3 +173,13 @@ def add_mesh(out: Scene, prototype, wanted: set[str], warnings: Warnings, known=
         return None
     out.meshes.append(mesh)
     return len(out.meshes) - 1
+
+
+def read_mesh(prototype, wanted: set[str], known=None):
+    """None where there are no faces."""
+
+    def read():
+        with readable(prototype.object, prototype.mesh) as mesh:
+            return export_mesh(mesh, prototype.name, wanted, prototype.is_deformed)
+
+    return known.read(prototype, wanted, read) if known else read()

@@ -32,8 +32,11 @@ _scratch = np.empty(0, np.float32)  # reused from image to image: paging in a fr
 
 
 def image_key(image, user=None) -> tuple:
-    """Equal for nodes that show the same pixels."""
-    return (image.as_pointer(), current_frame(image, user)) if image is not None else ()
+    """Equal for nodes that show the same pixels, as long as nobody paints on them."""
+    if image is None:
+        return ()
+    settings = (image.source, image.filepath_raw, image.alpha_mode, image.colorspace_settings.name, image.is_dirty)
+    return (image.original.session_uid, current_frame(image, user), *settings)
 
 
 def read_image(image, warn, user=None) -> list[Image]:

@@ -5,12 +5,26 @@ Arrays go over as Blender holds them (corners, faces, vertices); expanding them 
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+
 import numpy as np
 
 from .. import native
 from ..nodes.attributes import ACTIVE_COLOR, ISLAND, POINTINESS, UNDEFORMED
 from ..scene_data import Attribute, Mesh
 from .arrays import is_triangulated, read, read_attribute, triangle_corners
+
+
+@contextmanager
+def readable(item, mesh):
+    """The mesh of an evaluated object with its attributes: while it is edited, Blender gives but a wrapper of the edit mesh."""
+    if not mesh.polygons or "position" in mesh.attributes:
+        yield mesh
+        return
+    try:
+        yield item.to_mesh()
+    finally:
+        item.to_mesh_clear()
 
 
 def export_mesh(mesh, name: str, wanted: set[str], deformed: bool = False) -> Mesh | None:

@@ -71,7 +71,8 @@ class Collected:
     """The objects of a view layer, before anything big is read."""
 
     prototypes: list[Prototype] = field(default_factory=list)
-    lights: list[tuple] = field(default_factory=list)  # name, bpy Light, matrix, visibility
+    # Name, bpy Light, matrix, visibility, and the bpy Object unless it is a duplicate.
+    lights: list[tuple] = field(default_factory=list)
 
 
 def collect(depsgraph, warnings: Warnings, view=None) -> Collected:
@@ -129,7 +130,8 @@ class Walk:
         if isinstance(data, bpy.types.Light):
             visibility = self.visibility(item, instance.parent if lasting else item)
             self.note_linking(item)
-            self.found.lights.append((item.name, data, np.array(instance.matrix_world, np.float32), visibility))
+            matrix = np.array(instance.matrix_world, np.float32)
+            self.found.lights.append((item.name, data, matrix, visibility, None if lasting else item))
             return None
         if item.type in UNSUPPORTED:
             self.warnings.add(f"{UNSUPPORTED[item.type]} are not supported yet; left out", item.name)
@@ -228,8 +230,8 @@ def usable(matrices: np.ndarray) -> np.ndarray:
 
 def place(
     found: Collected, meshes: list[int | None], slots: list[list[int]], attributes: list[dict], warnings: Warnings
-) -> list[Instance]:
-    """Instances of all prototypes that have a mesh; the three lists go by prototype."""
+) -> list[Instance | None]:
+    """One for each prototype, None where it has no mesh or no place; so go the three lists."""
     instances = []
     stacked = stack_matrices(found.prototypes)
     every_good = usable(stacked)
@@ -237,6 +239,7 @@ def place(
     for prototype, mesh, programs, values in zip(found.prototypes, meshes, slots, attributes, strict=True):
         start, end = end, end + len(memoryview(prototype.matrices).cast("B")) // MATRIX_BYTES
         if mesh is None:
+            instances.append(None)
             continue
         matrices, good, randoms = stacked[start:end], every_good[start:end], randoms_of(prototype)
         if not good.all():
@@ -244,6 +247,7 @@ def place(
             matrices, randoms = matrices[good], randoms[good]
             values = {n: v[good] if np.ndim(v) == 2 and len(v) == len(good) else v for n, v in values.items()}
         if not len(matrices):
+            instances.append(None)
             continue
         single = len(matrices) == 1
         instances.append(

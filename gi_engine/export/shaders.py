@@ -11,11 +11,13 @@ from .warnings import Warnings
 
 
 class Shaders:
-    """Hands out indices into scene.programs."""
+    """Hands out indices into scene.programs. `known` programs (known.py) are not compiled again."""
 
-    def __init__(self, scene: Scene, depsgraph, warnings: Warnings):
+    def __init__(self, scene: Scene, depsgraph, warnings: Warnings, known=None):
         self.scene = scene
-        self.compiler = Compiler(scene, depsgraph, warnings.add, bpy.app.version >= (5, 0, 0))
+        self.known = known
+        images = known.images if known else None
+        self.compiler = Compiler(scene, depsgraph, warnings.add, bpy.app.version >= (5, 0, 0), images)
         self.index_of: dict[int, int] = {}
 
     def slots(self, materials: list) -> list[int]:
@@ -45,8 +47,13 @@ class Shaders:
         key = owner.as_pointer() if owner else 0
         if key not in self.index_of:
             self.index_of[key] = len(self.scene.programs)
-            self.scene.programs.append(compile_program(owner))
+            self.scene.programs.append(self.program(owner, compile_program))
         return self.index_of[key]
+
+    def program(self, owner, compile_program):
+        if self.known is None:
+            return compile_program(owner)
+        return self.known.programs.read(owner, self.compiler, compile_program)
 
     def wanted_attributes(self) -> set[str]:
         """Names of what programs read of meshes, and of objects (nodes/attributes.py)."""

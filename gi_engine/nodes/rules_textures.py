@@ -244,6 +244,8 @@ def sky(b):
 def ies(b):
     from ..export.texts import ies_text  # needs bpy
 
+    b.compiler.notes.lasting = False  # nobody says when a text or a file changes
+
     direction = b.input("Vector") if b.linked("Vector") else b.op("object_incoming")
     table = ies_table(ies_text(b.node))
     if table is None:

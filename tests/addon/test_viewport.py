@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-import random
 import threading
 import time
 
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
 
 import gi_engine
 from gi_engine import native, viewport
 from gi_engine.export import export
-from gi_engine.export.film import frame_size
 from gi_engine.look import border_region, camera_of, reduced
 from gi_engine.refine import Refiner, scales
 from gi_engine.scene_data import Film
-from gi_engine.sync import Sync, mark_of
 
 from .conftest import add, mesh
-
-EDITS_A_SEED = 40
 
 
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
@@ -109,173 +103,43 @@ def test_a_viewport_that_is_gone_ends_its_thread(job):
     assert not refiner._thread.is_alive()
 
 
+def of_integrator(job, integrator, camera_x=0.0, **parameters):
+    settings = dataclasses.replace(job.settings, integrator=integrator, samples=1 << 20, parameters=parameters)
+    matrix = job.camera.matrix.copy()
+    matrix[0, 3] += camera_x
+    return dataclasses.replace(job, settings=settings, camera=dataclasses.replace(job.camera, matrix=matrix))
+
+
+@pytest.mark.parametrize(
+    ("integrator", "shown", "parameters"),
+    [
+        ("irradiance_cache", "Cache Samples", {"record_samples": 32}),
+        ("photon_map", "Photon Density", {"global_photons": 20_000, "caustic_photons": 1000}),
+    ],
+)
+def test_caches_outlast_camera_moves_and_can_be_seen(job, integrator, shown, parameters):
+    """Though the session that they were made in was stopped."""
+    job.film.passes.append(shown)
+    refiner = Refiner(lambda: True)
+    refiner.show(of_integrator(job, integrator, **parameters))
+    wait_for(lambda: refiner.picture and refiner.picture.samples > 0)
+    moved = dataclasses.replace(of_integrator(job, integrator, 0.05, **parameters), shown=shown)
+    refiner.show(moved)
+    wait_for(lambda: refiner.picture.job is moved and refiner.picture.samples > 0)
+    assert not refiner.error and (refiner.picture.pixels[..., 0] > 0).mean() > 0
+    session = refiner._last.native
+    refiner.close()
+    assert session.figures()["cache records taken over"] > 10
+    if integrator == "photon_map":
+        assert "photon seconds" in session.figures()
+        assert session.kept()["global"][0, 0] == parameters["global_photons"]
+
+
 def test_the_same_job_is_not_begun_again(job):
     again = dataclasses.replace(job, camera=dataclasses.replace(job.camera, matrix=job.camera.matrix.copy()))
     assert viewport.same_job(again, job)
     again.camera.matrix[0, 3] += 1
     assert not viewport.same_job(again, job) and not viewport.same_job(job, None)
-
-
-# Sync
-
-
-class Watched:
-    """A Sync that hears of each change of the scene, as a viewport does."""
-
-    def __init__(self, scene):
-        self.scene, self.sync, self.restarts = scene, Sync(), 0
-        bpy.app.handlers.depsgraph_update_post.append(self.changed)
-        self.sync.update(bpy.context.evaluated_depsgraph_get())
-        self.restarts = 0
-
-    def changed(self, scene, depsgraph):
-        self.restarts += self.sync.update(depsgraph)
-
-    def settle(self):
-        bpy.context.view_layer.update()
-
-    def close(self):
-        bpy.app.handlers.depsgraph_update_post.remove(self.changed)
-
-
-@pytest.fixture
-def watched(lit):
-    made = Watched(lit)
-    yield made
-    made.close()
-
-
-def fresh():
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    size = frame_size(depsgraph.scene_eval.render)
-    return export(depsgraph, native.integrators(), None, size, needs_camera=False)
-
-
-def objects(kind):
-    return sorted((o for o in bpy.context.scene.objects if o.type == kind), key=lambda o: o.name)
-
-
-def test_only_what_changed_is_read(watched):
-    scene, sync = watched.scene, watched.sync
-    exports, reads = sync.exports, sync.meshes.reads
-    scene.camera.location.x += 1
-    watched.settle()
-    assert (sync.exports, watched.restarts) == (exports, 0)
-    scene.gi_engine.is_own = True
-    scene.gi_engine.clamp_direct = 3
-    scene.render.film_transparent = True  # of which every version tells
-    watched.settle()
-    assert (sync.exports, watched.restarts) == (exports, 1)
-    objects("LIGHT")[0].data.energy = 5
-    watched.settle()
-    objects("MESH")[0].location.x += 1
-    watched.settle()
-    assert watched.restarts == 3 and sync.meshes.reads == reads
-    objects("MESH")[0].data.vertices[0].co.z += 1
-    objects("MESH")[0].data.update()
-    watched.settle()
-    assert watched.restarts == 4 and sync.meshes.reads == reads + 1
-
-
-def move(rng):
-    rng.choice(objects("MESH") + objects("LIGHT")).location = [rng.uniform(-2, 2) for _ in range(3)]
-
-
-def turn(rng):
-    rng.choice(objects("MESH")).matrix_world = Matrix.Rotation(rng.uniform(0, 6), 4, "Z")
-
-
-def bend(rng):
-    data = rng.choice(objects("MESH")).data
-    data.vertices[0].co.z = rng.uniform(-1, 1)
-    data.update()
-
-
-def add_object(rng):
-    data = mesh() if rng.random() < 0.5 or not objects("MESH") else rng.choice(objects("MESH")).data
-    add(bpy.context.scene, "Added", data, location=[rng.uniform(-2, 2) for _ in range(3)])
-
-
-def remove_object(rng):
-    if len(objects("MESH")) > 1:
-        bpy.data.objects.remove(rng.choice(objects("MESH")))
-
-
-def hide(rng):
-    item = rng.choice(objects("MESH"))
-    item.hide_viewport = not item.hide_viewport
-
-
-def rename(rng):
-    rng.choice(objects("MESH") + objects("LIGHT")).name = f"Name {rng.randrange(1000)}"
-
-
-def paint(rng):
-    item = rng.choice(objects("MESH"))
-    if not item.data.materials:
-        item.data.materials.append(bpy.data.materials.new("Paint"))
-    material = item.data.materials[0]
-    if material.node_tree is None:
-        material.use_nodes = True
-    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Base Color"].default_value = (rng.random(), rng.random(), rng.random(), 1)
-
-
-def lamp(rng):
-    light = rng.choice(objects("LIGHT")).data
-    light.energy, light.color = rng.uniform(1, 100), (rng.random(), rng.random(), rng.random())
-
-
-def modify(rng):
-    item = rng.choice(objects("MESH"))
-    if item.modifiers:
-        item.modifiers.clear()
-    else:
-        item.modifiers.new("Array", "ARRAY").count = rng.randrange(2, 4)
-
-
-def world(rng):
-    scene = bpy.context.scene
-    scene.world = scene.world or bpy.data.worlds.new("World")
-    if scene.world.node_tree is None:
-        scene.world.use_nodes = True
-    background = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
-    background.inputs["Strength"].default_value = rng.random()
-
-
-def duplicate(rng):
-    """Instances of one object on the vertices of another."""
-    items = objects("MESH")
-    if len(items) > 1 and not items[0].parent:
-        items[1].parent = items[0]
-        items[0].instance_type = rng.choice(["NONE", "VERTS"])
-
-
-EDITS = (
-    *(move, turn, bend, add_object, remove_object, hide, rename, paint, lamp, modify, world, duplicate),
-)  # fmt: skip
-
-
-def drive(watched, seed: int, edits: int) -> None:
-    rng = random.Random(seed)
-    for number in range(edits):
-        done = [rng.choice(EDITS) for _ in range(rng.choice((1, 1, 1, 3)))]
-        for edit in done:
-            edit(rng)
-        watched.settle()
-        names = ", ".join(edit.__name__ for edit in done)
-        assert mark_of(watched.sync.exported) == mark_of(fresh()), f"seed {seed}, edit {number}: {names}"
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_random_edits_leave_what_a_fresh_export_has(watched, seed):
-    drive(watched, seed, EDITS_A_SEED)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100, 110))
-def test_thousands_of_random_edits(watched, seed):
-    drive(watched, seed, 300)
 
 
 # The add-on as a whole

@@ -13,25 +13,33 @@ namespace nb = nanobind;
 namespace gi::bind {
 namespace {
 
-// A scene with the camera and film that came with it.
 struct BoundScene {
-  std::unique_ptr<Scene> scene;
+  std::unique_ptr<const LitScene> scene;
   std::vector<std::string> warnings;
+  std::vector<nb::object> meshes;  // of a movable scene: what each was read from, held so that it is not taken for another
 };
 
-BoundScene* make_scene(nb::handle data, const std::string& embree, int threads) {
+BoundScene* make_scene(nb::handle data, const std::string& embree, int threads, bool movable, const BoundScene* before) {
   auto bound = std::make_unique<BoundScene>();
-  SceneData native = read_scene(data);
+  KnownMeshes known;
+  if (movable && before && !before->meshes.empty()) {
+    known.data = &before->scene->scene().data();
+    for (size_t m = 0; m < before->meshes.size(); ++m) known.index[before->meshes[m].ptr()] = int32_t(m);
+  }
+  SceneData native = read_scene(data, known);
+  if (movable)
+    for (nb::handle mesh : data.attr("meshes")) bound->meshes.push_back(nb::borrow(mesh));
   std::unique_ptr<ShaderResources> resources = read_resources(data);
   const nb::gil_scoped_release release;
   validate(native, bound->warnings);
-  bound->scene = std::make_unique<Scene>(std::move(native), std::move(resources), embree, threads);
+  const Editing editing{movable, known.data ? &before->scene->scene() : nullptr};
+  bound->scene = std::make_unique<LitScene>(std::make_unique<Scene>(std::move(native), std::move(resources), embree, threads, editing));
   return bound.release();
 }
 
 // What a pinhole in the middle of each pixel sees of emission alone.
 nb::ndarray<nb::numpy, float> emission_seen(const BoundScene& bound, nb::handle data, size_t width, size_t height) {
-  const Scene& scene = *bound.scene;
+  const Scene& scene = bound.scene->scene();
   const Camera camera = read_camera(data);
   auto* pixels = new std::vector<float>(width * height * 3);
   nb::capsule owner(pixels, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
@@ -159,18 +167,20 @@ void bind_render(nb::module_& m) {
   nb::class_<BoundScene>(m, "Scene", "A scene ready to be traced, made of a scene_data.Scene.")
       .def(
           "__init__",
-          [](BoundScene* self, nb::handle data, const std::string& embree, int threads) {
-            std::unique_ptr<BoundScene> made(make_scene(data, embree, threads));
+          [](BoundScene* self, nb::handle data, const std::string& embree, int threads, bool movable, const BoundScene* before) {
+            std::unique_ptr<BoundScene> made(make_scene(data, embree, threads, movable, before));
             new (self) BoundScene(std::move(*made));
           },
-          nb::arg("data"), nb::arg("embree"), nb::arg("threads") = 0,
-          "`embree`: path of the Embree library. Raises ValueError naming the object or material for bad input, RuntimeError\n"
+          nb::arg("data"), nb::arg("embree"), nb::arg("threads") = 0, nb::arg("movable") = false, nb::arg("before").none() = nb::none(),
+          "`embree`: path of the Embree library. `movable`: for a scene that is edited. What `before`, movable as well, made of the same\n"
+          "Mesh objects is used again; these must not have changed. Raises ValueError naming the object or material for bad input, "
+          "RuntimeError\n"
           "where Embree or the machine fails, MemoryError.")
       .def_prop_ro("warnings", [](const BoundScene& s) { return s.warnings; })
       .def_prop_ro(
-          "embree", [](const BoundScene& s) { return s.scene->embree_description(); }, "The library in use and its version.")
+          "embree", [](const BoundScene& s) { return s.scene->scene().embree_description(); }, "The library in use and its version.")
       .def_prop_ro(
-          "memory", [](const BoundScene& s) { return s.scene->memory_bytes(); }, "Bytes.")
+          "memory", [](const BoundScene& s) { return s.scene->scene().memory_bytes(); }, "Bytes.")
       .def("emission_seen", &emission_seen, nb::arg("camera"), nb::arg("width"), nb::arg("height"),
            "What is emitted towards the camera at the middle of each pixel: (height, width, 3) float32, row 0 at the bottom.")
       .def(
@@ -180,7 +190,7 @@ void bind_render(nb::module_& m) {
             auto* t = new std::vector<float>(n);
             for (size_t i = 0; i < n; ++i) {
               const float* r = rays.data() + 6 * i;
-              const auto hit = s.scene->intersect({{r[0], r[1], r[2]}, {r[3], r[4], r[5]}}, ~0u);
+              const auto hit = s.scene->scene().intersect({{r[0], r[1], r[2]}, {r[3], r[4], r[5]}}, ~0u);
               (*t)[i] = hit ? hit->t : kInf;
             }
             nb::capsule owner(t, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
@@ -208,6 +218,10 @@ void bind_render(nb::module_& m) {
           },
           nb::arg("cameras"), "Before the start: where the camera will be in other frames.")
       .def("stay_steady", &Session::stay_steady, "Before the start: a frame among others; what it takes over is not made better.")
+      .def(
+          "continue_from", &Session::continue_from, nb::arg("earlier"),
+          "Before the start: what an earlier session of the same scene, integrator and parameters has worked out, be it cancelled, serves\n"
+          "on. It must have ended, and keeps nothing. Raises ValueError.")
       .def("kept", &kept_tables, "Once ended: what another render of the scene may take over, float32 tables (rows, columns) by name.")
       .def("start", &Session::start)
       .def("wait", &Session::wait, nb::arg("seconds"), nb::call_guard<nb::gil_scoped_release>(), "True once the render has ended.")

@@ -236,10 +236,18 @@ MaterialData read_program(const Record& r) {
 
 }  // namespace
 
-SceneData read_scene(nb::handle scene) {
+SceneData read_scene(nb::handle scene, const KnownMeshes& known) {
   const Record r{nb::borrow(scene), "the scene"};
   SceneData d;
-  for (const Record& m : r.list("meshes", "mesh")) d.meshes.push_back(read_mesh(m));
+  for (const Record& m : r.list("meshes", "mesh")) {
+    const auto found = known.index.find(m.object.ptr());
+    if (found == known.index.end() || known.data->meshes[size_t(found->second)].is_moved) {
+      d.meshes.push_back(read_mesh(m));
+    } else {
+      d.meshes.push_back(known.data->meshes[size_t(found->second)]);
+      d.meshes.back().before = found->second;
+    }
+  }
   for (const Record& i : r.list("instances", "object")) read_instances(i, d.instances);
   for (const Record& l : r.list("lights", "light")) d.lamps.push_back(read_lamp(l));
   for (const Record& p : r.list("programs", "material")) d.materials.push_back(read_program(p));

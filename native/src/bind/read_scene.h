@@ -2,6 +2,8 @@
 #pragma once
 #include <nanobind/nanobind.h>
 
+#include <map>
+
 #include "film/film.h"
 #include "render/session.h"
 #include "scene/camera.h"
@@ -9,7 +11,13 @@
 
 namespace gi::bind {
 
-SceneData read_scene(nanobind::handle scene);
+// The scene_data.Mesh objects that an earlier scene was made of, and what it made of them.
+struct KnownMeshes {
+  const SceneData* data = nullptr;
+  std::map<const PyObject*, int32_t> index;
+};
+
+SceneData read_scene(nanobind::handle scene, const KnownMeshes& known = {});
 Camera read_camera(nanobind::handle camera);
 FilmSpec read_film(nanobind::handle film);
 RenderSettings read_settings(nanobind::handle settings);

@@ -57,6 +57,11 @@ class Integrator {
   // For those whose descriptor has a `kept_version`: before the first pass, of the same version; and after the last.
   virtual void take_over(const Kept&) {}  // throws InputError where that is not what it keeps
   virtual Kept keep() const { return {}; }
+  // Before the first pass: takes what `earlier`, of the same kind, parameters and scene, knows of the scene's light, whoever looked at it.
+  // That one may have been stopped anywhere, and is not used any more.
+  virtual void continue_from(Integrator& earlier) {
+    if (const Kept kept = earlier.keep(); !kept.empty()) take_over(kept);
+  }
 };
 
 // What paths may meet besides surfaces that scatter where they are met. Of the rest an integrator makes the surface's own fallback.

@@ -11,6 +11,12 @@
 namespace gi {
 namespace {
 
+// Whether what has gone on since `began` has had its part of the time limit.
+bool is_late(const RenderContext& context, double began) {
+  constexpr double kTimeShare = 0.15;  // each map's, and that of what is read from them
+  return context.time_limit > 0.0 && context.seconds() - began > kTimeShare * context.time_limit;
+}
+
 // What eye rays are when they come from gathering.
 PathState gathering() {
   PathState eye;
@@ -22,37 +28,39 @@ PathState gathering() {
 // photons, but these lie where it is bright: what is dark would be read as what is bright beside it.
 class IrradianceMap {
  public:
-  IrradianceMap() = default;
-  IrradianceMap(const std::vector<PathEnd>& places, const PhotonMap& map, size_t count, float radius, const RenderContext& context)
-      : count_(count), radius_(radius) {
+  // Adds those of `places` whose neighbourhood is not known yet.
+  void cover(const std::vector<PathEnd>& places, const PhotonMap& map, size_t count, float radius, const RenderContext& context) {
+    look_up_by(count, radius);
+    const double began = context.seconds();
+    std::vector<Record> records = records_;
     std::vector<Vec3> positions;
-    for (const PathEnd& p : places) positions.push_back(p.position);
+    for (size_t k = 0; k < records.size(); ++k) positions.push_back(tree_.point(uint32_t(k)));
+    for (const PathEnd& p : places) {
+      if (nearest(p.position, p.normal)) continue;
+      positions.push_back(p.position), records.push_back({p.normal, Rgb(), 0.0f});
+    }
     tree_ = PointTree(positions, context.pool);
-    records_.resize(tree_.size());
+    records_.clear();
+    for (const uint32_t k : tree_.order()) records_.push_back(records[k]);
     constexpr size_t kBatch = 256;
     context.pool.for_each(int((records_.size() + kBatch - 1) / kBatch), context.cancelled, [&](int b) {
       for (size_t k = size_t(b) * kBatch; k < std::min((size_t(b) + 1) * kBatch, records_.size()); ++k) {
         Record& r = records_[k];
-        r.normal = places[tree_.order()[k]].normal;
+        if (r.reach > 0.0f || is_late(context, began)) continue;
         r.irradiance = map.irradiance(tree_.point(uint32_t(k)), r.normal, radius_, count, kEye, &context.scene, &r.reach);
       }
     });
   }
+  // What no record is near is looked up among the nearest `count` photons within `radius`.
+  void look_up_by(size_t count, float radius) { count_ = count, radius_ = radius; }
 
   // Power per square metre on the side of `normal`; nothing if photons are from farther about than `distance`, which is how far it is
   // seen from: from there it would show as a blot. [Jensen 2001, §9.3.4]
   std::optional<Rgb> at(const PhotonMap& map, const Scene& scene, Vec3 position, Vec3 normal, float distance) const {
-    constexpr float kSlope = 0.9f, kThickness = 0.5f;
-    float best = sqr(radius_);
-    uint32_t nearest = kNoId;
-    tree_.within(position, best, [&](uint32_t k, float d2) {
-      if (dot(records_[k].normal, normal) < kSlope || sqr(dot(tree_.point(k) - position, normal)) > sqr(kThickness) * d2) return;
-      if (d2 < best || k < nearest) best = d2, nearest = k;
-    });
     float reach = 0.0f;
     Rgb found;
-    if (nearest != kNoId && best <= sqr(records_[nearest].reach))
-      found = records_[nearest].irradiance, reach = records_[nearest].reach;
+    if (const Record* r = nearest(position, normal))
+      found = r->irradiance, reach = r->reach;
     else
       found = map.irradiance(position, normal, radius_, count_, kEye, &scene, &reach);
     return reach > distance ? std::nullopt : std::optional(found);
@@ -64,8 +72,21 @@ class IrradianceMap {
   struct Record {
     Vec3 normal;
     Rgb irradiance;
-    float reach = 0;  // its photons are in this radius
+    float reach = 0;  // its photons are in this radius; 0: not worked out
   };
+
+  // The record that a place is read from; null: none is near enough.
+  const Record* nearest(Vec3 position, Vec3 normal) const {
+    constexpr float kSlope = 0.9f, kThickness = 0.5f;
+    float best = sqr(radius_);
+    uint32_t nearest = kNoId;
+    tree_.within(position, best, [&](uint32_t k, float d2) {
+      if (dot(records_[k].normal, normal) < kSlope || sqr(dot(tree_.point(k) - position, normal)) > sqr(kThickness) * d2) return;
+      if (d2 < best || k < nearest) best = d2, nearest = k;
+    });
+    return nearest != kNoId && best <= sqr(records_[nearest].reach) && records_[nearest].reach > 0.0f ? &records_[nearest] : nullptr;
+  }
+
   std::vector<Record> records_;  // in the order of the tree
   PointTree tree_;
   size_t count_ = 0;
@@ -83,22 +104,28 @@ float typical_spread(const PhotonMap& map, const std::vector<PathEnd>& places, s
   return 2.0f * *most;
 }
 
+constexpr int kBatches = 16;  // of photons
+
 // A map, and how it came to be.
 struct Stock {
   PhotonMap map;
   double paths = 0;  // sent for it
   size_t count = 0;  // neighbours
   float reach = 0;  // farther away they are not looked for
+  int batches = 0;  // sent of those that are wanted at least
+  std::vector<Photon> loose = {};  // of all batches, where the map does not have them all yet
 
+  bool is_complete() const { return batches >= kBatches && loose.empty(); }
+  bool is_begun() const { return batches > 0; }
+  void settle(ThreadPool& pool) {
+    map = PhotonMap(loose, paths, pool);
+    loose.clear();
+  }
   KeptTable keep() const;
 };
 
-// Photons of an earlier render, and how many paths were sent for them.
-struct KeptPhotons {
-  std::vector<Photon> photons;
-  double paths = 0;  // 0: there was none
-};
-KeptPhotons photons_of(const Kept& kept, const std::string& name);
+// Photons of an earlier render.
+Stock photons_of(const Kept& kept, const std::string& name);
 
 // How light between diffuse surfaces is found.
 enum class GlobalLight { kGathered, kCached, kPhotons, kNone };
@@ -144,8 +171,8 @@ class PhotonMapIntegrator final : public Integrator {
 
   void take_over(const Kept& kept) override {
     Kept records = kept;
-    kept_caustic_ = photons_of(kept, kCaustic);
-    if (way_ != GlobalLight::kNone) kept_global_ = photons_of(kept, kGlobal);
+    caustic_ = photons_of(kept, kCaustic);
+    if (way_ != GlobalLight::kNone) global_ = photons_of(kept, kGlobal);
     records.erase(kGlobal), records.erase(kCaustic);
     records_.take_over(records);
   }
@@ -156,6 +183,15 @@ class PhotonMapIntegrator final : public Integrator {
     if (way_ != GlobalLight::kNone) kept[kGlobal] = global_.keep();
     return kept;
   }
+  // Photons go on where they were stopped. What was read from fewer than all of them is worked out anew.
+  void continue_from(Integrator& other) override {
+    auto& earlier = static_cast<PhotonMapIntegrator&>(other);
+    global_ = std::move(earlier.global_), caustic_ = std::move(earlier.caustic_);
+    continues_ = true;
+    if (!has_all_photons()) return;
+    irradiance_ = std::move(earlier.irradiance_);
+    if (const Kept records = earlier.records_.keep(); !records.empty()) records_.take_over(records);
+  }
 
  private:
   static constexpr const char *kGlobal = "global", *kCaustic = "caustic";
@@ -163,8 +199,6 @@ class PhotonMapIntegrator final : public Integrator {
   static constexpr float kSmoothing = 3.0f;  // standard deviations, the same
   static constexpr IrradianceSpacing kSpacing{1.5f, 40.0f, 0.0f, 0.0f};
 
-  static constexpr int kBatches = 8;  // of photons
-  static constexpr double kTimeShare = 0.15;  // of a time limit, for each map
   static constexpr int kRecordsAcross = 192;  // paths across the picture whose ends know irradiance
 
   static DiffuseEndSettings settings(const Parameters& p, bool gathers) {
@@ -209,31 +243,33 @@ class PhotonMapIntegrator final : public Integrator {
     return Rgb();
   }
 
+  bool has_all_photons() const { return caustic_.is_complete() && (way_ == GlobalLight::kNone || global_.is_complete()); }
+
   void build(const RenderContext& context, const Film& film) {
     const double start = context.seconds();
-    const auto seen_global = find_ends(context, film, s_.limits, gathers(), kLooksAcross),
-               seen_caustic = find_ends(context, film, s_.limits, false, kLooksAcross);
-    if (kept_caustic_.paths == 0.0) {
+    // A first look at what another view has photons of: at once, with what there is.
+    const bool has_global = way_ != GlobalLight::kNone;
+    const bool glances = continues_ && context.time_limit > 0.0 && caustic_.is_begun() && (!has_global || global_.is_begun());
+    if (glances) {
+      if (has_global) glance(context, film, gathers(), global_count_, global_);
+      glance(context, film, false, caustic_count_, caustic_);
+      irradiance_.look_up_by(global_.count, global_.reach);
+    } else {
+      const auto seen_global = find_ends(context, film, s_.limits, gathers(), kLooksAcross),
+                 seen_caustic = find_ends(context, film, s_.limits, false, kLooksAcross);
       const FilmSpec& spec = film.spec();
       SubpathSettings light;
       light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height}, light.weighs = false;
       const uint8_t all = gathers() ? kAllPhotons : kGlobalPhoton;
-      if (way_ != GlobalLight::kNone) global_ = send(context, light, kGlobal, global_photons_, global_count_, all, seen_global);
+      if (has_global) send(context, light, kGlobal, global_photons_, global_count_, all, seen_global, global_);
       light.only_by_mirrors = true;
-      caustic_ = send(context, light, kCaustic, caustic_photons_, caustic_count_, kCausticPhoton, seen_caustic);
-    } else {
-      if (way_ != GlobalLight::kNone)
-        global_ = {PhotonMap(std::move(kept_global_.photons), kept_global_.paths, context.pool), kept_global_.paths};
-      caustic_ = {PhotonMap(std::move(kept_caustic_.photons), kept_caustic_.paths, context.pool), kept_caustic_.paths};
-      come_to_neighbours(global_, seen_global, global_count_), come_to_neighbours(caustic_, seen_caustic, caustic_count_);
+      send(context, light, kCaustic, caustic_photons_, caustic_count_, kCausticPhoton, seen_caustic, caustic_);
     }
     if (context.cancelled) return;
     const double traced = context.seconds();
     context.log.stage("irradiance by photons");
-    if (gathers()) {
-      const auto places = find_ends(context, film, s_.limits, true, kRecordsAcross);
-      irradiance_ = IrradianceMap(places, global_.map, global_.count, global_.reach, context);
-    }
+    if (gathers() && !glances)
+      irradiance_.cover(find_ends(context, film, s_.limits, true, kRecordsAcross), global_.map, global_.count, global_.reach, context);
     context.log.stage("");
     built_ = !context.cancelled;
     const size_t bytes = global_.map.memory_bytes() + caustic_.map.memory_bytes();
@@ -245,45 +281,60 @@ class PhotonMapIntegrator final : public Integrator {
                     std::to_string((bytes + irradiance_.memory_bytes()) >> 20) + " MiB");
   }
 
-  // Sends light paths that aim at what is seen: `paths` of them, and as many again until the error is as wished.
-  Stock send(const RenderContext& context, SubpathSettings light, const std::string& name, int paths, size_t count, uint8_t classes,
-             const std::vector<PathEnd>& seen) const {
+  void glance(const RenderContext& context, const Film& film, bool gathered, size_t count, Stock& stock) const {
+    if (stock.map.size() == 0 && !stock.loose.empty()) stock.settle(context.pool);
+    if (stock.count == 0) come_to_neighbours(stock, find_ends(context, film, s_.limits, gathered, kLooksAcross), count);
+  }
+
+  // Sends light paths that aim at what is seen: `paths` of them, and as many again until the error is as wished. Goes on with what is in
+  // `stock`; where it is stopped, all that was sent stays there.
+  void send(const RenderContext& context, SubpathSettings light, const std::string& name, int paths, size_t count, uint8_t classes,
+            const std::vector<PathEnd>& seen, Stock& stock) const {
     context.log.stage(name + " photons");
-    const EmissionGuide guide = learn_emission(context, light, paths, classes, seen);
-    light.guide = &guide;
+    std::optional<EmissionGuide> guide;
     const double began = context.seconds();
-    std::vector<Photon> photons;
+    const auto trace = [&](int batch, int size) {
+      if (!guide) guide = learn_emission(context, light, paths, classes, seen);
+      light.guide = &*guide;
+      const std::vector<Photon> more = trace_photons(context, light, batch, size, classes);
+      if (stock.loose.empty()) stock.loose.reserve(size_t(1.02 * kBatches * double(more.size())));  // about as many as there will be
+      if (!context.cancelled) stock.loose.insert(stock.loose.end(), more.begin(), more.end());
+    };
+    const bool was_complete = stock.is_complete();
+    if (stock.loose.empty() && !was_complete) stock.loose = stock.map.photons();
     const int batch = (paths + kBatches - 1) / kBatches;
-    int batches = 0;
-    do {
-      const auto more = trace_photons(context, light, batches, batch, classes);
-      if (batches == 0) photons.reserve(size_t(1.02 * kBatches * double(more.size())));  // about as many as there will be
-      photons.insert(photons.end(), more.begin(), more.end());
-    } while (++batches * batch < paths && !context.cancelled && !is_late(context, began));
-    if (batches * batch < paths && !context.cancelled)
-      context.log.say(name + " photons: time for " + std::to_string(batches * batch) + " of " + std::to_string(paths) + " light paths");
-    for (double sent = double(batches) * batch; !context.cancelled; sent *= 2.0) {
-      Stock stock{PhotonMap(photons, sent, context.pool), sent};
+    while (stock.batches < kBatches && !(stock.batches > 0 && is_late(context, began))) {
+      trace(stock.batches, batch);
+      if (context.cancelled) return;
+      stock.paths = double(++stock.batches) * batch;
+    }
+    if (!was_complete) stock.settle(context.pool);
+    if (stock.batches < kBatches)
+      context.log.say(name + " photons: time for " + std::to_string(stock.batches * batch) + " of " + std::to_string(paths) +
+                      " light paths");
+    while (!context.cancelled) {
       const PhotonError error = come_to_neighbours(stock, seen, count);
-      if (goal_ <= 0.0) return stock;
-      const char* reason = photons.empty()                                                                             ? "there are none"
+      if (goal_ <= 0.0) return;
+      const char* reason = stock.map.size() == 0                                                                       ? "there are none"
                            : error.total() <= goal_                                                                    ? "as wished"
                            : 2 * stock.map.memory_bytes() > most_bytes_                                                ? "memory is used up"
                            : context.time_limit > 0.0 && 3.0 * (context.seconds() - began) > 0.25 * context.time_limit ? "time is used up"
-                           : sent > 5e8 ? "there are too many"
-                                        : nullptr;
+                           : stock.paths > 5e8 ? "there are too many"
+                                               : nullptr;
       const std::string state = name + " photons: error " + percent(error.total()) + " (noise " + percent(error.noise) + ", blur " +
-                                percent(error.blur) + ") after " + std::to_string(int64_t(sent)) + " light paths";
+                                percent(error.blur) + ") after " + std::to_string(int64_t(stock.paths)) + " light paths";
       context.log.stage(state);
       if (reason) {
         context.log.say(state + ", " + std::to_string(stock.count) + " neighbours: " + reason);
         context.log.set(name + " photon error", error.total());
-        return stock;
+        return;
       }
-      const auto more = trace_photons(context, light, 1, int(sent), classes);
-      photons.insert(photons.end(), more.begin(), more.end());
+      stock.loose = stock.map.photons();
+      trace(1, int(stock.paths));
+      if (context.cancelled) return stock.loose.clear();  // those of before are in the map
+      stock.paths *= 2.0;
+      stock.settle(context.pool);
     }
-    return {};
   }
 
   // Sets how many neighbours are looked for, and how far away: `count`, or as many as the noise that is wished asks for.
@@ -296,11 +347,6 @@ class PhotonMapIntegrator final : public Integrator {
     stock.count = std::clamp(size_t(double(count) * sqr(noise / wished)), kFewest, kMost);
     stock.reach = typical_spread(stock.map, seen, stock.count);
     return stock.map.error(seen, stock.reach, stock.count, eye);
-  }
-
-  // Whether photons sent since `began` have had their part of the time limit.
-  static bool is_late(const RenderContext& context, double began) {
-    return context.time_limit > 0.0 && context.seconds() - began > kTimeShare * context.time_limit;
   }
 
   static std::string percent(double x) {
@@ -346,8 +392,7 @@ class PhotonMapIntegrator final : public Integrator {
   IrradianceRecords records_;
   Stock global_, caustic_;
   IrradianceMap irradiance_;
-  KeptPhotons kept_global_, kept_caustic_;
-  bool built_ = false;
+  bool built_ = false, continues_ = false;
 };
 
 // A row for each photon; the first row says how many paths were sent for them.
@@ -359,18 +404,18 @@ KeptTable Stock::keep() const {
   return table;
 }
 
-KeptPhotons photons_of(const Kept& kept, const std::string& name) {
+Stock photons_of(const Kept& kept, const std::string& name) {
   const auto found = kept.find(name);
   require(found != kept.end() && found->second.columns == Photon::kNumbers && found->second.rows() > 0,
           "there is no table '" + name + "' of photons");
   const KeptTable& table = found->second;
-  KeptPhotons all;
-  all.paths = table.numbers[0];
+  Stock all;
+  all.paths = table.numbers[0], all.batches = kBatches;
   require(all.paths >= 1.0 && std::isfinite(all.paths), "'" + name + "' does not say how many light paths were sent");
   for (size_t i = 1; i < table.rows(); ++i) {
     const auto photon = Photon::read(&table.numbers[i * table.columns]);
     require(photon.has_value(), "'" + name + "', row " + std::to_string(i) + ": no photon");
-    all.photons.push_back(*photon);
+    all.loose.push_back(*photon);
   }
   return all;
 }

@@ -12,9 +12,9 @@ double now() { return std::chrono::duration<double>(std::chrono::steady_clock::n
 
 }  // namespace
 
-Session::Session(const Scene& scene, const Camera& camera, FilmSpec film, RenderSettings settings,
+Session::Session(const LitScene& scene, const Camera& camera, FilmSpec film, RenderSettings settings,
                  const std::optional<LightmapSpec>& lightmap)
-    : scene_(scene), camera_(camera), film_(std::move(film)), settings_(std::move(settings)) {
+    : lit_(scene), scene_(scene.scene()), camera_(camera), film_(std::move(film)), settings_(std::move(settings)) {
   require(settings_.samples >= 0 && settings_.time_limit >= 0 && settings_.noise_target >= 0,
           "samples, time limit and noise target must not be negative");
   require(settings_.samples > 0 || settings_.time_limit > 0 || settings_.noise_target > 0,
@@ -22,7 +22,7 @@ Session::Session(const Scene& scene, const Camera& camera, FilmSpec film, Render
   const Descriptor& d = find_integrator(settings_.integrator);
   if (lightmap) {
     require(d.bakes, "integrator '" + settings_.integrator + "' cannot bake lightmaps");
-    lightmap_ = std::make_unique<const Lightmap>(scene, *lightmap, film_.spec().width, film_.spec().height);
+    lightmap_ = std::make_unique<const Lightmap>(scene_, *lightmap, film_.spec().width, film_.spec().height);
   }
   integrator_ = d.create(Parameters(d.parameters, settings_.parameters, d.id));
 }
@@ -40,6 +40,15 @@ void Session::start() {
 void Session::take_over(const Kept& kept) {
   require(!thread_.joinable(), "the session was started already");
   integrator_->take_over(kept);
+}
+
+void Session::continue_from(Session& earlier) {
+  require(!thread_.joinable(), "the session was started already");
+  require(earlier.progress().done, "the earlier session has not ended");
+  require(&earlier.scene_ == &scene_ && earlier.settings_.integrator == settings_.integrator &&
+              earlier.settings_.parameters == settings_.parameters,
+          "the earlier session was of another scene, integrator or parameters");
+  integrator_->continue_from(*earlier.integrator_);
 }
 
 void Session::look_along(std::vector<Camera> path) {
@@ -69,10 +78,9 @@ void Session::run() {
   try {
     ThreadPool pool(settings_.threads);
     scene_.resources().camera = &camera_;
-    const LightSet lights(scene_);
     const Volumes volumes(scene_, pool);
     const RenderContext context{scene_,
-                                lights,
+                                lit_.lights(settings_.threads),
                                 volumes,
                                 camera_,
                                 pool,

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "integrators/integrator.h"
+#include "render/lit_scene.h"
 
 namespace gi {
 
@@ -37,11 +38,13 @@ class Session {
  public:
   // The scene must outlive the session. Throws InputError.
   // With a `lightmap` it is a bake: the film lies over a surface.
-  Session(const Scene& scene, const Camera& camera, FilmSpec film, RenderSettings settings,
+  Session(const LitScene& scene, const Camera& camera, FilmSpec film, RenderSettings settings,
           const std::optional<LightmapSpec>& lightmap = {});
   ~Session();  // cancels and waits
   // Before start(): what a render by the same integrator kept; where the camera will be in other frames. Throws InputError.
   void take_over(const Kept& kept);
+  // What an earlier session that has ended, of the same scene, integrator and parameters, knows of the scene's light.
+  void continue_from(Session& earlier);
   void look_along(std::vector<Camera> path);
   void stay_steady() { steady_ = true; }
   void start();
@@ -57,6 +60,7 @@ class Session {
   void run();
   bool enough(int passes, double seconds, float noise) const;
 
+  const LitScene& lit_;
   const Scene& scene_;
   Camera camera_;
   std::vector<Camera> path_;

@@ -1,4 +1,5 @@
-// Accel on Embree: one top-level scene; a mesh that is used once is attached to it directly, the others as instances.
+// Accel on Embree: one top-level scene; meshes in world space are attached to it directly, the others as instances of scenes of their own,
+// which further Accels may share.
 #include "scene/accel.h"
 
 #include <algorithm>
@@ -37,30 +38,89 @@ void keep_instance(const FilterArguments* a) {
   if ((h.instance[0] != kInvalidId ? h.instance[0] : h.geometry) != one->instance) a->valid[0] = 0;
 }
 
-class EmbreeAccel final : public Accel {
- public:
-  EmbreeAccel(const std::string& library, std::vector<AccelMesh> meshes, std::vector<AccelInstance> instances, int threads)
-      : api_(load_embree(library)) {
+// Embree itself, for all Accels that share trees.
+struct SharedDevice {
+  const Api& api;
+  Device device = nullptr;
+  std::atomic<ptrdiff_t> bytes{0};
+  std::atomic<bool> failed{false};
+  std::string error, description;
+
+  SharedDevice(const std::string& library, int threads) : api(load_embree(library)) {
     // Never one thread: TBB 2021.12 then leaves a worker that asks for work for ever, from the second device on.
     const std::string config = threads > 0 ? "threads=" + std::to_string(std::max(threads, 2)) : "";
-    device_ = api_.NewDevice(config.c_str());
-    if (!device_) throw DeviceError("Embree could not start (library " + library + ")");
-    try {
-      if (const std::string problem = probe(api_, device_); !problem.empty())
-        throw DeviceError("the Embree library " + library + " does not fit: " + problem);
-      const auto version = api_.GetDeviceProperty(device_, kVersion);
-      description_ = library + " (Embree " + std::to_string(version / 10000) + "." + std::to_string(version / 100 % 100) + "." +
-                     std::to_string(version % 100) + ")";
-      api_.SetDeviceErrorFunction(device_, &EmbreeAccel::on_error, this);
-      api_.SetDeviceMemoryMonitorFunction(device_, &EmbreeAccel::on_memory, this);
-      build(meshes, instances);
-      if (failed_) throw DeviceError("Embree could not build the scene: " + error_);
-    } catch (...) {
-      release();
-      throw;
+    device = api.NewDevice(config.c_str());
+    if (!device) throw DeviceError("Embree could not start (library " + library + ")");
+    if (const std::string problem = probe(api, device); !problem.empty()) {
+      api.ReleaseDevice(device);
+      throw DeviceError("the Embree library " + library + " does not fit: " + problem);
+    }
+    const auto version = api.GetDeviceProperty(device, kVersion);
+    description = library + " (Embree " + std::to_string(version / 10000) + "." + std::to_string(version / 100 % 100) + "." +
+                  std::to_string(version % 100) + ")";
+    api.SetDeviceErrorFunction(device, &SharedDevice::on_error, this);
+    api.SetDeviceMemoryMonitorFunction(device, &SharedDevice::on_memory, this);
+  }
+  SharedDevice(const SharedDevice&) = delete;
+  ~SharedDevice() { api.ReleaseDevice(device); }
+
+  static void on_error(void* self, int code, const char* text) {
+    auto* shared = static_cast<SharedDevice*>(self);
+    shared->failed = true;
+    shared->error = (text ? std::string(text) : std::string()) + " (code " + std::to_string(code) + ")";
+  }
+  static bool on_memory(void* self, ptrdiff_t bytes, bool) {
+    static_cast<SharedDevice*>(self)->bytes += bytes;
+    return true;
+  }
+
+  Geometry triangles(const AccelMesh& mesh) const {
+    Geometry g = api.NewGeometry(device, kTriangle);
+    api.SetSharedGeometryBuffer(g, kVertexBuffer, 0, kFloat3, mesh.positions, 0, 12, mesh.vertex_count);
+    api.SetSharedGeometryBuffer(g, kIndexBuffer, 0, kUint3, mesh.indices, 0, 12, mesh.triangle_count);
+    return g;
+  }
+  void attach(Scene scene, Geometry geometry, uint32_t mask, uint32_t id) const {
+    api.SetGeometryMask(geometry, mask);
+    api.CommitGeometry(geometry);
+    api.AttachGeometryByID(scene, geometry, id);
+    api.ReleaseGeometry(geometry);
+  }
+};
+
+// The tree over one mesh in object space.
+struct MeshTree {
+  std::shared_ptr<const SharedDevice> shared;
+  AccelMesh mesh;
+  Scene scene = nullptr;
+
+  MeshTree(std::shared_ptr<const SharedDevice> device, const AccelMesh& m) : shared(std::move(device)), mesh(m) {
+    scene = shared->api.NewScene(shared->device);
+    shared->attach(scene, shared->triangles(mesh), 0xffffffffu, 0);
+    shared->api.CommitScene(scene);
+  }
+  MeshTree(const MeshTree&) = delete;
+  ~MeshTree() { shared->api.ReleaseScene(scene); }
+};
+
+class EmbreeAccel final : public Accel {
+ public:
+  EmbreeAccel(const std::string& library, std::vector<AccelMesh> meshes, std::vector<AccelInstance> instances, int threads,
+              const EmbreeAccel* before, std::span<const int32_t> mesh_before)
+      : shared_(before ? before->shared_ : std::make_shared<SharedDevice>(library, threads)),
+        api_(shared_->api),
+        meshes_(std::move(meshes)) {
+    shared_->failed = false;
+    trees_.resize(meshes_.size());
+    for (size_t m = 0; before && m < mesh_before.size(); ++m)
+      if (mesh_before[m] >= 0) trees_[m] = before->trees_[size_t(mesh_before[m])];
+    build(instances);
+    if (shared_->failed) {
+      api_.ReleaseScene(top_);
+      throw DeviceError("Embree could not build the scene: " + shared_->error);
     }
   }
-  ~EmbreeAccel() override { release(); }
+  ~EmbreeAccel() override { api_.ReleaseScene(top_); }
 
   std::optional<gi::Hit> intersect(const gi::Ray& ray, uint32_t mask) const override {
     QueryArguments arguments;
@@ -103,8 +163,8 @@ class EmbreeAccel final : public Accel {
     hits.erase(std::unique(hits.begin(), hits.end(), same), hits.end());
   }
 
-  size_t memory_bytes() const override { return size_t(std::max<ptrdiff_t>(bytes_, 0)); }
-  std::string description() const override { return description_; }
+  size_t memory_bytes() const override { return size_t(std::max<ptrdiff_t>(shared_->bytes, 0)); }
+  std::string description() const override { return shared_->description; }
 
  private:
   std::optional<gi::Hit> nearest(const gi::Ray& ray, uint32_t mask, QueryArguments& arguments) const {
@@ -115,16 +175,6 @@ class EmbreeAccel final : public Accel {
     if (rh.hit.geometry == kInvalidId) return {};
     const uint32_t instance = rh.hit.instance[0] != kInvalidId ? rh.hit.instance[0] : rh.hit.geometry;
     return gi::Hit{rh.ray.t_far, instance, rh.hit.primitive, rh.hit.u, rh.hit.v};
-  }
-
-  static void on_error(void* self, int code, const char* text) {
-    auto* accel = static_cast<EmbreeAccel*>(self);
-    accel->failed_ = true;
-    accel->error_ = (text ? std::string(text) : std::string()) + " (code " + std::to_string(code) + ")";
-  }
-  static bool on_memory(void* self, ptrdiff_t bytes, bool) {
-    static_cast<EmbreeAccel*>(self)->bytes_ += bytes;
-    return true;
   }
 
   static void fill(embree::Ray& r, const gi::Ray& ray, uint32_t mask) {
@@ -142,66 +192,39 @@ class EmbreeAccel final : public Accel {
          0};
   }
 
-  Geometry triangles(const AccelMesh& mesh) {
-    Geometry g = api_.NewGeometry(device_, kTriangle);
-    api_.SetSharedGeometryBuffer(g, kVertexBuffer, 0, kFloat3, mesh.positions, 0, 12, mesh.vertex_count);
-    api_.SetSharedGeometryBuffer(g, kIndexBuffer, 0, kUint3, mesh.indices, 0, 12, mesh.triangle_count);
-    return g;
-  }
-  void attach(Scene scene, Geometry geometry, uint32_t mask, uint32_t id) {
-    api_.SetGeometryMask(geometry, mask);
-    api_.CommitGeometry(geometry);
-    api_.AttachGeometryByID(scene, geometry, id);
-    api_.ReleaseGeometry(geometry);
-  }
-
-  void build(const std::vector<AccelMesh>& meshes, const std::vector<AccelInstance>& instances) {
-    top_ = api_.NewScene(device_);
-    bases_.resize(meshes.size(), nullptr);
+  void build(const std::vector<AccelInstance>& instances) {
+    top_ = api_.NewScene(shared_->device);
     for (uint32_t i = 0; i < instances.size(); ++i) {
       const AccelInstance& instance = instances[i];
-      const AccelMesh& mesh = meshes[instance.mesh];
+      const AccelMesh& mesh = meshes_[instance.mesh];
       if (mesh.triangle_count == 0) continue;
       if (!instance.matrix) {
-        attach(top_, triangles(mesh), instance.mask, i);
+        shared_->attach(top_, shared_->triangles(mesh), instance.mask, i);
         continue;
       }
-      Scene& base = bases_[instance.mesh];
-      if (!base) {
-        base = api_.NewScene(device_);
-        attach(base, triangles(mesh), 0xffffffffu, 0);
-        api_.CommitScene(base);
-      }
-      Geometry g = api_.NewGeometry(device_, kInstance);
-      api_.SetGeometryInstancedScene(g, base);
+      std::shared_ptr<const MeshTree>& tree = trees_[instance.mesh];
+      if (!tree) tree = std::make_shared<const MeshTree>(shared_, mesh);
+      Geometry g = api_.NewGeometry(shared_->device, kInstance);
+      api_.SetGeometryInstancedScene(g, tree->scene);
       api_.SetGeometryTransform(g, 0, kFloat3x4RowMajor, &instance.matrix->m[0][0]);
-      attach(top_, g, instance.mask, i);
+      shared_->attach(top_, g, instance.mask, i);
     }
     api_.CommitScene(top_);
   }
 
-  void release() {
-    if (top_) api_.ReleaseScene(top_);
-    for (Scene base : bases_)
-      if (base) api_.ReleaseScene(base);
-    if (device_) api_.ReleaseDevice(device_);
-    top_ = nullptr, device_ = nullptr, bases_.clear();
-  }
-
+  std::shared_ptr<SharedDevice> shared_;
   const Api& api_;
-  Device device_ = nullptr;
+  std::vector<AccelMesh> meshes_;
+  std::vector<std::shared_ptr<const MeshTree>> trees_;  // by mesh; null where none was needed
   Scene top_ = nullptr;
-  std::vector<Scene> bases_;
-  std::atomic<ptrdiff_t> bytes_{0};
-  std::atomic<bool> failed_{false};
-  std::string error_, description_;
 };
 
 }  // namespace
 
 std::unique_ptr<Accel> build_accel(const std::string& library, std::vector<AccelMesh> meshes, std::vector<AccelInstance> instances,
-                                   int threads) {
-  return std::make_unique<EmbreeAccel>(library, std::move(meshes), std::move(instances), threads);
+                                   int threads, const Accel* before, std::span<const int32_t> mesh_before) {
+  return std::make_unique<EmbreeAccel>(library, std::move(meshes), std::move(instances), threads, static_cast<const EmbreeAccel*>(before),
+                                       mesh_before);
 }
 
 }  // namespace gi

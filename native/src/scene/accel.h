@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,12 +17,13 @@ struct Hit {
   float b1 = 0, b2 = 0;
 };
 
-// A mesh as Embree sees it: buffers are shared and must outlive the Accel; `positions` readable 4 bytes past its end.
+// A mesh as Embree sees it: buffers are shared, the owners keep them alive; `positions` readable 4 bytes past its end.
 struct AccelMesh {
   const float* positions = nullptr;
   size_t vertex_count = 0;
   const uint32_t* indices = nullptr;
   size_t triangle_count = 0;
+  std::shared_ptr<void> positions_owner, indices_owner;
 };
 
 struct AccelInstance {
@@ -44,8 +46,9 @@ class Accel {
 };
 
 // Loads Embree from `library`, checks that it is laid out as we think, builds in `threads` threads (0: all cores).
+// `mesh_before`: which mesh of `before` each mesh is, buffers and all, so that its tree serves again where there is one; -1: none.
 // Throws DeviceError.
 std::unique_ptr<Accel> build_accel(const std::string& library, std::vector<AccelMesh> meshes, std::vector<AccelInstance> instances,
-                                   int threads);
+                                   int threads, const Accel* before = nullptr, std::span<const int32_t> mesh_before = {});
 
 }  // namespace gi

@@ -1,6 +1,8 @@
 // Scene: placing meshes, interpolating what programs ask for, running them. Ray tracing itself is Accel's.
 #include "scene/scene.h"
 
+#include <algorithm>
+
 #include "core/check.h"
 
 namespace gi {
@@ -9,6 +11,15 @@ namespace {
 // Instances whose materials may let shadow rays through answer to this bit instead of kRayShadow, so that one
 // occlusion query settles all that is opaque.
 constexpr uint32_t kTransparentShadowBit = 1u << 16;
+
+Bounds bounds_of(const Array<float>& positions) {
+  Bounds bounds;
+  for (size_t v = 0; v < positions.size; v += 3) {
+    const Vec3 p{positions[v], positions[v + 1], positions[v + 2]};
+    if (is_finite(p)) bounds.add(p);
+  }
+  return bounds;
+}
 
 // Turns and scales alike in all directions.
 bool keeps_angles(const Affine& a) {
@@ -20,22 +31,26 @@ bool keeps_angles(const Affine& a) {
 
 }  // namespace
 
-Scene::Scene(SceneData data, std::unique_ptr<ShaderResources> resources, const std::string& embree, int threads)
+Scene::Scene(SceneData data, std::unique_ptr<ShaderResources> resources, const std::string& embree, int threads, const Editing& editing)
     : data_(std::move(data)), resources_(std::move(resources)) {
   resources_->scene = this;
-  index_vertices();
+  index_vertices(editing.before);
   resolve_attributes();
-  make_tangents();  // in object space, so before meshes are placed
-  place_meshes();
-  build_accel(embree, threads);
+  make_tangents(editing.before);  // in object space, so before meshes are placed
+  place_meshes(editing);
+  build_accel(embree, threads, editing.before);
 }
 
 Scene::~Scene() = default;
 
 // ---------------------------------------------------------------- building
 
-void Scene::index_vertices() {
+void Scene::index_vertices(const Scene* before) {
   for (const MeshData& mesh : data_.meshes) {
+    if (mesh.before >= 0) {
+      indices_.push_back(before->indices_[size_t(mesh.before)]);
+      continue;
+    }
     if (mesh.triangulated) {
       const Array<const int32_t>& corners = mesh.corner_vert;
       indices_.push_back({reinterpret_cast<const uint32_t*>(corners.data), corners.size, corners.owner});
@@ -47,7 +62,8 @@ void Scene::index_vertices() {
   }
 }
 
-void Scene::place_meshes() {
+void Scene::place_meshes(const Editing& editing) {
+  mesh_bounds_.resize(data_.meshes.size());
   std::vector<uint32_t> uses(data_.meshes.size(), 0);
   for (const InstanceData& i : data_.instances) ++uses[i.mesh];
   for (const InstanceData& i : data_.instances) {
@@ -56,9 +72,10 @@ void Scene::place_meshes() {
     placed.to_world = i.matrix;
     placed.to_object = i.matrix.inverse();
     placed.mirrored = i.matrix.determinant() < 0.0f;
-    placed.world_space = uses[i.mesh] == 1;
+    // As an instance, what is flat by its matrix could not be traced.
+    placed.world_space = uses[i.mesh] == 1 && (!editing.movable || i.matrix.inverse().determinant() == 0.0f);
     // So does Cycles, which moves a mesh that one object alone uses, normals and all.
-    placed.world_normals = placed.world_space && !keeps_angles(i.matrix);
+    placed.world_normals = uses[i.mesh] == 1 && !keeps_angles(i.matrix);
     placed.data = &i;
     MeshData& mesh = data_.meshes[i.mesh];
     if (placed.world_space && !i.matrix.is_identity()) {
@@ -69,12 +86,11 @@ void Scene::place_meshes() {
         (*moved)[v] = p.x, (*moved)[v + 1] = p.y, (*moved)[v + 2] = p.z;
       }
       mesh.positions = {moved->data(), mesh.positions.size, moved};
+      mesh.before = -1, mesh.is_moved = true;
     }
-    Bounds local;
-    for (size_t v = 0; v < mesh.positions.size; v += 3) {
-      const Vec3 p{mesh.positions[v], mesh.positions[v + 1], mesh.positions[v + 2]};
-      if (is_finite(p)) local.add(p);
-    }
+    Bounds& local = mesh_bounds_[i.mesh];
+    if (mesh.before >= 0) local = editing.before->mesh_bounds_[size_t(mesh.before)];
+    if (local.empty()) local = bounds_of(mesh.positions);
     for (int corner = 0; corner < 8 && !local.empty(); ++corner) {
       const Vec3 p{corner & 1 ? local.hi.x : local.lo.x, corner & 2 ? local.hi.y : local.lo.y, corner & 4 ? local.hi.z : local.lo.z};
       bounds_.add(placed.world_space ? p : placed.to_world.point(p));
@@ -96,7 +112,15 @@ void Scene::resolve_attributes() {
   }
 }
 
-void Scene::make_tangents() {
+// What the scene before had of the same mesh and map.
+Scene::Tangents Scene::known_tangents(const MeshData& mesh, int slot, const Scene* before) const {
+  if (mesh.before < 0 || before->tangents_[size_t(mesh.before)].empty()) return nullptr;
+  const std::vector<std::string>& names = before->data_.attribute_names;
+  const auto found = std::find(names.begin(), names.end(), data_.attribute_names[size_t(slot)]);
+  return found == names.end() ? nullptr : before->tangents_[size_t(mesh.before)][size_t(found - names.begin())];
+}
+
+void Scene::make_tangents(const Scene* before) {
   // Which op takes tangents of the map in which of its immediates.
   static constexpr std::pair<std::string_view, int> kUsers[] = {{"normal_map_tangent", 0}, {"tangent_uv", 0}, {"vector_displacement", 0}};
   tangents_.resize(data_.meshes.size());
@@ -105,8 +129,9 @@ void Scene::make_tangents() {
       for (const auto& [op, immediate] : kUsers) {
         for (const int32_t slot : data_.materials[size_t(material)].program.immediates(op, immediate)) {
           tangents_[i.mesh].resize(data_.attribute_names.size());
-          std::vector<CornerTangent>& made = tangents_[i.mesh][size_t(slot)];
-          if (made.empty()) made = tangents_of(i.mesh, slot);
+          Tangents& made = tangents_[i.mesh][size_t(slot)];
+          if (!made) made = known_tangents(data_.meshes[i.mesh], slot, before);
+          if (!made) made = std::make_shared<const std::vector<CornerTangent>>(tangents_of(i.mesh, slot));
         }
       }
     }
@@ -137,11 +162,14 @@ std::vector<CornerTangent> Scene::tangents_of(uint32_t m, int slot) const {
   return corner_tangents(corners);
 }
 
-void Scene::build_accel(const std::string& embree, int threads) {
+void Scene::build_accel(const std::string& embree, int threads, const Scene* before) {
   std::vector<AccelMesh> meshes;
+  std::vector<int32_t> mesh_before;
   for (size_t m = 0; m < data_.meshes.size(); ++m) {
     const MeshData& mesh = data_.meshes[m];
-    meshes.push_back({mesh.positions.data, mesh.vertex_count(), indices_[m].data, mesh.triangle_count()});
+    meshes.push_back(
+        {mesh.positions.data, mesh.vertex_count(), indices_[m].data, mesh.triangle_count(), mesh.positions.owner, indices_[m].owner});
+    mesh_before.push_back(mesh.before);
   }
   std::vector<AccelInstance> placed;
   for (const Instance& i : instances_) {
@@ -156,7 +184,7 @@ void Scene::build_accel(const std::string& embree, int threads) {
       if (data_.materials[size_t(program)].volume >= 0) mask |= kVolumeBit;
     placed.push_back({i.mesh, i.world_space ? nullptr : &i.to_world, mask});
   }
-  accel_ = gi::build_accel(embree, std::move(meshes), std::move(placed), threads);
+  accel_ = gi::build_accel(embree, std::move(meshes), std::move(placed), threads, before ? before->accel_.get() : nullptr, mesh_before);
 }
 
 size_t Scene::memory_bytes() const {
@@ -166,7 +194,7 @@ size_t Scene::memory_bytes() const {
     for (const AttributeData& a : m.attributes) bytes += a.data.size * 4;
   }
   for (const auto& slots : tangents_)
-    for (const auto& corners : slots) bytes += corners.size() * sizeof(CornerTangent);
+    for (const Tangents& corners : slots) bytes += corners ? corners->size() * sizeof(CornerTangent) : 0;
   return bytes;
 }
 
@@ -421,9 +449,9 @@ Vec3 Scene::smooth_object_normal(const ShadingPoint& point) const {
 
 std::optional<CornerTangent> Scene::uv_tangent(const ShadingPoint& point, int slot) const {
   if (point.instance == kNoId) return {};
-  const std::vector<std::vector<CornerTangent>>& slots = tangents_[point.mesh];
-  if (slots.empty() || slots[size_t(slot)].empty()) return {};
-  const CornerTangent* corner = slots[size_t(slot)].data() + 3 * size_t(point.triangle);
+  const std::vector<Tangents>& slots = tangents_[point.mesh];
+  if (slots.empty() || !slots[size_t(slot)] || slots[size_t(slot)]->empty()) return {};
+  const CornerTangent* corner = slots[size_t(slot)]->data() + 3 * size_t(point.triangle);
   const float w[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
   CornerTangent sum{Vec3{}, 0.0f};
   for (int k = 0; k < 3; ++k) sum.direction += w[k] * corner[k].direction, sum.side += w[k] * corner[k].side;

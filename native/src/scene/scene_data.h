@@ -38,6 +38,9 @@ struct MeshData {
   std::vector<AttributeData> attributes;
   std::string active_uv;
   Vec3 texture_location, texture_size{1, 1, 1};
+  int32_t before = -1;  // which mesh of the scene before this one it is (Editing), checked there; -1: none
+  bool is_moved = false;  // by Scene, to world space
+  std::vector<std::string> warnings;
   size_t triangle_count() const { return (triangulated ? corner_vert.size : tri_corner.size) / 3; }
   size_t corner(size_t k) const { return triangulated ? k : size_t(tri_corner[k]); }  // 3 per triangle
   bool has_faces() const { return triangulated || !tri_face.empty(); }

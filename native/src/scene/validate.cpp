@@ -25,7 +25,7 @@ Array<const int32_t> owned(std::vector<int32_t> values) {
   return {keep->data(), keep->size(), keep};
 }
 
-void drop_broken_triangles(MeshData& mesh, std::vector<std::string>& warnings) {
+void drop_broken_triangles(MeshData& mesh) {
   const size_t n = mesh.triangle_count();
   size_t first = 0;
   while (first < n && triangle_is_sound(mesh, first)) ++first;
@@ -36,8 +36,8 @@ void drop_broken_triangles(MeshData& mesh, std::vector<std::string>& warnings) {
     for (size_t k = 0; k < 3; ++k) corners.push_back(int32_t(mesh.corner(3 * t + k)));
     if (mesh.has_faces()) faces.push_back(int32_t(mesh.face(t)));
   }
-  warnings.push_back("mesh '" + mesh.name + "': " + std::to_string(n - corners.size() / 3) +
-                     " triangles with vertices that are not finite or out of range are left out");
+  mesh.warnings.push_back("mesh '" + mesh.name + "': " + std::to_string(n - corners.size() / 3) +
+                          " triangles with vertices that are not finite or out of range are left out");
   mesh.tri_corner = owned(std::move(corners));
   if (mesh.has_faces()) mesh.tri_face = owned(std::move(faces));
   mesh.triangulated = false;
@@ -47,7 +47,7 @@ size_t elements(const MeshData& mesh, Domain domain, size_t faces) {
   return domain == Domain::kPoint ? mesh.vertex_count() : domain == Domain::kCorner ? mesh.corner_vert.size : faces;
 }
 
-void validate_mesh(MeshData& mesh, std::vector<std::string>& warnings) {
+void validate_mesh(MeshData& mesh) {
   const std::string who = "mesh '" + mesh.name + "': ";
   require(mesh.positions.size % 3 == 0, who + "positions must have 3 columns");
   require(mesh.tri_corner.size % 3 == 0, who + "tri_corner must have 3 columns");
@@ -55,7 +55,7 @@ void validate_mesh(MeshData& mesh, std::vector<std::string>& warnings) {
   require(!mesh.triangulated || mesh.tri_face.empty(), who + "tri_face needs tri_corner");
   require(mesh.tri_face.empty() || mesh.tri_face.size == mesh.triangle_count(), who + "tri_face must have one entry for each triangle");
   size_t faces = mesh.triangulated ? mesh.triangle_count() : mesh.face_material.size;
-  drop_broken_triangles(mesh, warnings);
+  drop_broken_triangles(mesh);
   for (size_t t = 0; t < mesh.tri_face.size; ++t) {
     require(mesh.tri_face[t] >= 0, who + "tri_face holds a negative index");
     faces = std::max(faces, size_t(mesh.tri_face[t]) + 1);
@@ -92,7 +92,10 @@ void check_program(const SceneData& data, int program, const std::string& who, i
 }  // namespace
 
 void validate(SceneData& data, std::vector<std::string>& warnings) {
-  for (MeshData& mesh : data.meshes) validate_mesh(mesh, warnings);
+  for (MeshData& mesh : data.meshes) {
+    if (mesh.before < 0) validate_mesh(mesh);
+    warnings.insert(warnings.end(), mesh.warnings.begin(), mesh.warnings.end());
+  }
 
   std::vector<uint32_t> uses(data.meshes.size(), 0);
   for (const InstanceData& i : data.instances) {
