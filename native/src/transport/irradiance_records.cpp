@@ -16,6 +16,9 @@ constexpr double kDeeperShare = 0.25;   // of what remains of that, for each lev
 constexpr float kSlack = 1.3f;          // times the error that is let pass where records were taken over, or each frame would add some
 constexpr float kCoarser = 2.0f;        // times the maximum spacing that a record of another frame may hold for
 constexpr size_t kRefined = 256;         // records at a time
+constexpr double kFewMisses = 0.01;     // of lookups: not worth filling
+constexpr double kRaysOfSample = 1.5;   // that one ray of a record comes to
+constexpr double kGapsShare = 0.1;      // of the time left, at most
 constexpr int kAhead = 4;                // times the passes made for which refining may have been paid
 constexpr uint32_t kSeekSalt = 0x1c5eedu, kGatherSalt = 0x1c6a74u;  // streams of their own
 
@@ -85,8 +88,7 @@ void IrradianceRecords::before_pass(const RenderContext& context, const Film& fi
 void IrradianceRecords::after_pass(const RenderContext& context, int pass) {
   pass_rays_ += double(context.scene.rays_traced() - rays_before_);
   passes_ = pass + 1;
-  const double hits = double(hits_.total()), all = hits + double(misses_.total());
-  const double rate = all > 0.0 ? hits / all : 1.0;
+  const double rate = 1.0 - miss_rate();
   context.log.set("cache hit rate", rate);
   char text[64];
   std::snprintf(text, sizeof text, "%zu records, %.1f %% hits", size(), 100.0 * rate);
@@ -133,43 +135,70 @@ void IrradianceRecords::play_overture(const Work& work) {
 
 // From coarse to fine over the picture; pixels of one step in an order without order, so that a wave's are far apart.
 void IrradianceRecords::fill_level(const Work& work, int level) {
+  for (int step = kCoarsest; step >= (level == 0 ? kFinest : kSeedStep) && !work.context.cancelled; step /= 2)
+    fill_seen(work, level, step, 0);
+}
+
+// Places that passes came upon and no record holds at: thin things that the overture's one ray for a pixel went past. In so far as it is
+// worth it: as much as refining may cost.
+void IrradianceRecords::fill_gaps(const Work& work, int pass) {
+  const RenderContext& context = work.context;
+  const FilmSpec& spec = work.film.spec();
+  const double pixels = double(spec.region_width()) * double(spec.region_height());
+  const bool often = (pass & (pass - 1)) != 0;  // each finds most of what there is
+  if (often || context.steady || miss_rate() < kFewMisses) return;
+  if (miss_rate() * pixels * double(s_.samples) * kRaysOfSample > rays_to_refine(context, pass)) return;
+  const double seconds = context.seconds();
+  level_ends_ = seconds + kGapsShare * std::max(context.time_limit - seconds, 0.0);
+  for (int level = level_count() - 1; level >= 0 && !context.cancelled; --level) {
+    const size_t before = levels_[size_t(level)].size();
+    fill_seen(work, level, level == 0 ? kFinest : kSeedStep, pass);
+    if (levels_[size_t(level)].size() == before) continue;
+    levels_[size_t(level)].freeze();
+    levels_[size_t(level)].smooth(context.pool, context.cancelled, pass);
+  }
+}
+
+// A round of camera rays, one for each `step` pixels of a row or column.
+void IrradianceRecords::fill_seen(const Work& work, int level, int step, int round) {
   struct Pixel {
     int x, y, eye;
   };
   const RenderContext& context = work.context;
   const FilmSpec& spec = work.film.spec();
-  for (int step = kCoarsest; step >= (level == 0 ? kFinest : kSeedStep) && !context.cancelled; step /= 2) {
-    std::vector<Pixel> pixels;
-    for (int eye = -1; eye < int(context.path.size()); ++eye)
-      for (int y = step / 2; y < spec.region_height(); y += step)
-        for (int x = step / 2; x < spec.region_width(); x += step) pixels.push_back({spec.x0 + x, spec.y0 + y, eye});
-    const auto key = [](const Pixel& p) { return hash_combine(uint32_t(p.x), uint32_t(p.y)); };
-    std::sort(pixels.begin(), pixels.end(), [&](const Pixel& a, const Pixel& b) {
-      const uint32_t ka = key(a), kb = key(b);
-      return ka != kb ? ka < kb : std::tuple(a.y, a.x, a.eye) < std::tuple(b.y, b.x, b.eye);
-    });
-    constexpr int kBatch = 64;
-    std::vector<std::vector<IrradiancePlace>> found((pixels.size() + kBatch - 1) / kBatch);
-    context.pool.for_each(int(found.size()), context.cancelled, [&](int batch) {
-      const size_t end = std::min(pixels.size(), size_t(batch + 1) * kBatch);
-      for (size_t i = size_t(batch) * kBatch; i < end && !is_late(context); ++i) {
-        const Pixel& p = pixels[i];
-        seek(work, p.eye < 0 ? context.camera : context.path[size_t(p.eye)], p.x, p.y, level, found[size_t(batch)]);
-      }
-    });
-    std::vector<IrradiancePlace> places;
-    for (const auto& batch : found) places.insert(places.end(), batch.begin(), batch.end());
-    fill(work, std::move(places), level);
-  }
+  std::vector<Pixel> pixels;
+  for (int eye = -1; eye < int(context.path.size()); ++eye)
+    for (int y = step / 2; y < spec.region_height(); y += step)
+      for (int x = step / 2; x < spec.region_width(); x += step) pixels.push_back({spec.x0 + x, spec.y0 + y, eye});
+  const auto key = [](const Pixel& p) { return hash_combine(uint32_t(p.x), uint32_t(p.y)); };
+  std::sort(pixels.begin(), pixels.end(), [&](const Pixel& a, const Pixel& b) {
+    const uint32_t ka = key(a), kb = key(b);
+    return ka != kb ? ka < kb : std::tuple(a.y, a.x, a.eye) < std::tuple(b.y, b.x, b.eye);
+  });
+  constexpr int kBatch = 64;
+  std::vector<std::vector<IrradiancePlace>> found((pixels.size() + kBatch - 1) / kBatch);
+  context.pool.for_each(int(found.size()), context.cancelled, [&](int batch) {
+    const size_t end = std::min(pixels.size(), size_t(batch + 1) * kBatch);
+    for (size_t i = size_t(batch) * kBatch; i < end && !is_late(context); ++i) {
+      const Pixel& p = pixels[i];
+      seek(work, p.eye < 0 ? context.camera : context.path[size_t(p.eye)], p.x, p.y, level, round, found[size_t(batch)]);
+    }
+  });
+  std::vector<IrradiancePlace> places;
+  for (const auto& batch : found) places.insert(places.end(), batch.begin(), batch.end());
+  fill(work, std::move(places), level);
 }
 
 // Diffuse surfaces of a level along one path through a pixel that the cache does not cover.
-void IrradianceRecords::seek(const Work& work, const Camera& eye, int x, int y, int level, std::vector<IrradiancePlace>& places) const {
+void IrradianceRecords::seek(const Work& work, const Camera& eye, int x, int y, int level, int round,
+                             std::vector<IrradiancePlace>& places) const {
   const RenderContext& context = work.context;
   const FilmSpec& spec = work.film.spec();
-  Sampler sampler(hash_combine(context.seed, kSeekSalt + uint32_t(level)), uint32_t(y) * uint32_t(spec.width) + uint32_t(x), 0);
+  Sampler sampler(hash_combine(context.seed, kSeekSalt + uint32_t(level)), uint32_t(y) * uint32_t(spec.width) + uint32_t(x),
+                  uint32_t(round));
   const Vec2 pixel{1.0f / float(spec.width), 1.0f / float(spec.height)};
-  const CameraRay camera = eye.sample({(float(x) + 0.5f) * pixel.x, (float(y) + 0.5f) * pixel.y}, pixel, sampler.next_2d());
+  const Vec2 lens = sampler.next_2d(), within = round > 0 ? sampler.next_2d() : Vec2{0.5f, 0.5f};
+  const CameraRay camera = eye.sample({(float(x) + within.x) * pixel.x, (float(y) + within.y) * pixel.y}, pixel, lens);
   Bsdf bsdf;
   CameraPath path(camera);
   PixelSample nowhere;
@@ -259,6 +288,7 @@ void IrradianceRecords::refine(const Work& work, int pass) {
   };
   const uint64_t start = context.scene.rays_traced();
   const double wanted = rays_to_refine(context, pass);
+  fill_gaps(work, pass);
   const size_t all = size();
   const auto spent = [&] { return double(context.scene.rays_traced() - start); };
   for (size_t idle = 0; idle < all && spent() < wanted;) {

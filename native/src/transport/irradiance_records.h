@@ -58,13 +58,19 @@ class IrradianceRecords {
   std::optional<Rgb> look_up(const ShadingPoint& point, const Bsdf& bsdf, int level, PixelSample& result) const;
   void play_overture(const Work& work);
   void fill_level(const Work& work, int level);
-  void seek(const Work& work, const Camera& eye, int x, int y, int level, std::vector<IrradiancePlace>& places) const;
+  void fill_gaps(const Work& work, int pass);
+  void fill_seen(const Work& work, int level, int step, int round);
+  void seek(const Work& work, const Camera& eye, int x, int y, int level, int round, std::vector<IrradiancePlace>& places) const;
   void fill(const Work& work, std::vector<IrradiancePlace> places, int level);
   double rays_to_refine(const RenderContext& context, int pass) const;
   void refine(const Work& work, int pass);
   GatheredIrradiance gather(const Work& work, const IrradiancePlace& place, int level, uint32_t serial) const;
   bool is_late(const RenderContext& context) const { return context.time_limit > 0.0 && context.seconds() > level_ends_; }
 
+  double miss_rate() const {
+    const double misses = double(misses_.total()), all = double(hits_.total()) + misses;
+    return all > 0.0 ? misses / all : 0.0;
+  }
   int level_count() const { return std::min(s_.levels, most_bounces()); }
   // Deeper records are seen through shallower ones: they may be coarser.
   float error_at(int level) const { return level == 0 ? s_.error : std::min(2.0f * s_.error, 0.6f); }
