@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 from light_scenes import lamp, matrix, with_world
-from test_closed_forms import looking, quad, scene_of, shiny, sphere, surface
+from test_closed_forms import cube, looking, quad, scene_of, shiny, sphere, surface
 from test_closures import stack_layers
 
 from gi_engine import scene_data as sd
@@ -123,6 +123,23 @@ def sheet(fill):
     return quad((-0.5, -0.6, 0.0), (0.9, -0.6, 0.1), (0.9, 0.8, 0.2), (-0.5, 0.8, 0.1)), program(fill)
 
 
+def tinted(fill, *lights):
+    """A block that is nothing but what absorbs, within which a ball floats."""
+    block = program(lambda b: b.op("transparent", 1.0, (1, 1, 1)))
+    block.only_volume = True
+    scene = ball(GREY, *lights)
+    scene.meshes.append(cube(0.6))
+    scene.instances.append(sd.Instance("block", len(scene.meshes) - 1, matrix(), [len(scene.programs)]))
+    block.volume = len(scene.programs) + 1
+    scene.programs += [block, program(fill)]
+    return scene
+
+
+def absorbs_along_x(b):
+    amount = b.op("vector_add", b.op("position"), (0.7, 0.9, 1.5))
+    b.op("volume_coefficients", 1.0, amount, (0, 0, 0), (0, 0, 0), 0.0, 0.0, imm=(0,))
+
+
 GREY = surface(0.5)
 SCENES = {
     "point lamp": lambda: ball(GREY, point(), flat=True),
@@ -152,6 +169,7 @@ SCENES = {
     "bumpy gloss": lambda: ball(bumpy_gloss),
     "translucent": lambda: room(sheet(translucent), lights=(area(),)),
     "transparent shadows": lambda: room(sheet(half_transparent), lights=(area(),)),
+    "tinted block": lambda: tinted(absorbs_along_x, point(), area()),
     "two lamps": lambda: ball(GREY, point(), area()),
 }  # fmt: skip
 # Images in mirrors and through glass, which light tracing does not see, under a lamp so large that path tracing finds caustics.

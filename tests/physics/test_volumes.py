@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from light_scenes import emission, matrix
+from light_scenes import emission, lamp, matrix
 from test_closed_forms import check, cube, looking, probe, quad, scene_of, surface
 
 from gi_engine import native
@@ -194,10 +194,11 @@ def test_the_sky_through_a_world_that_thins_out():
 
 
 def test_furnace_of_a_world_that_thins_out():
-    def thins_out(b):
-        return b.op("vector_minimum", by_height(0.3, 0.1, 0.5)(b), (0.4, 0.4, 0.4))
+    def both_ways(b):
+        z = b.op("math_absolute", b.component(b.op("position"), 2))
+        return b.op("vector_scale", (0.3, 0.1, 0.5), b.op("math_exponent", b.op("math_multiply", z, -1.0)))
 
-    scene = filled_world(medium(None, thins_out), glow=1.0)
+    scene = filled_world(medium(None, both_ways), glow=1.0)
     check(seen(scene, (0, 0, 0), (0.2, 0, 1), samples=32), 1.0, 5e-3)
 
 
@@ -240,14 +241,15 @@ def test_every_integrator_sees_a_luminaire_from_within(integrator):
     check(probe(scene, (0.1, 0.2, 0.5), (0, 0, -1), 16, integrator=integrator), math.exp(-0.4))
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("integrator", [i for i in INTEGRATORS if i != "light"])
 def test_every_integrator_lights_a_surface_through_what_absorbs(integrator):
-    """A lamp high above a small floor, with a slab between that all its light goes through at right angles."""
+    """The sun above a small floor, with a slab between that all its light goes through at right angles. Light tracing, which hardly ever
+    comes by so small a spot, is compared with path tracing (agreement_scenes)."""
     floor = quad((-0.2, -0.2, -3), (0.2, -0.2, -3), (0.2, 0.2, -3), (-0.2, 0.2, -3)), surface(0.5)
 
     def seen_floor(volume):
         scene = filled(volume, floor)
-        scene.lights.append(sd.Light("sun", "SUN", (1.0,) * 3, matrix=matrix((0, 0, 5)), angle=0.0))
+        scene.lights.append(lamp("SUN", matrix=matrix((0, 0, 5)), angle=0.0))
         return probe(scene, (0.05, 0.02, -2), (0, 0, -1), 16, width=0.01, integrator=integrator, pixels=16)
 
     clear, tinted = seen_floor(medium((0.0, 0.0, 0.0))), seen_floor(medium((0.4, 0.4, 0.4)))

@@ -38,7 +38,7 @@ MediumEvent sample_uniform(const Medium& medium, float t_max, Rgb throughput, bo
 // False where there were so many that the way is given up: a cell with very much in one place, and nothing in another.
 template <class Way, class Rate, class Pass, class Collide>
 bool track(const Way& way, float from, float t_max, Sampler& random, const Rate& rate, const Pass& pass, const Collide& collide) {
-  constexpr int kMostLooks = 1 << 13;
+  constexpr int kMostLooks = 1 << 15;
   t_max = std::min(t_max, way.end());
   int looks = 0;
   const auto draw = [&] { return -std::log(1.0f - random.next_1d()); };

@@ -9,7 +9,7 @@ namespace {
 constexpr int kWithin = 2;               // samples within a cell
 constexpr float kMargin = 0.25f;         // of what the samples of a cell differ by
 constexpr float kLeastLooks = 0.25f;     // across a box, wherever there seems to be nothing
-constexpr float kLeastShare = 0.01f;     // of the most in the box, likewise
+constexpr float kLeastShare = 0.01f, kMostOfThat = 4.0f;  // of the most in the box, likewise; but no more looks across the box than that
 constexpr float kEmissionLooks = 8.0f;   // across a box as bright as its brightest cell
 
 struct Seen {
@@ -98,7 +98,7 @@ VolumeGrid::VolumeGrid(const Bounds& innermost, int boxes, int cells, float metr
     Seen total;
     for (const Seen& s : all.values) total.add(s);
     const float across = 2.0f * length(half) * metres_per_unit;
-    const float floor = std::max(kLeastLooks / across, kLeastShare * max_component(total.most));
+    const float floor = std::max(kLeastLooks / across, std::min(kLeastShare * max_component(total.most), kMostOfThat / across));
     for (const Seen& s : all.values) {
       VolumeBounds& b = box.bounds.emplace_back();
       for (int c = 0; c < 3; ++c) {

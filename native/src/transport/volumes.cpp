@@ -5,7 +5,7 @@ namespace gi {
 namespace {
 
 constexpr int kMostCells = 1 << 20;       // of all objects together
-constexpr int kWorldBoxes = 20;           // so that the last is a million times the scene
+constexpr int kWorldBoxes = 12;  // the last is four thousand times the scene: rays along a layer of mist are long ones
 constexpr int kWorldCells = 16;
 
 // The rays by which a program may be asked, as far as it looks at them.
