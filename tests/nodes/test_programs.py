@@ -132,6 +132,46 @@ def test_folding_and_packing_change_nothing(steps):
     assert folded.tolist() == computed.tolist()
 
 
+SPECIAL = st.sampled_from([0.0, 1.0, -1.0, 0.5, 2.0, 0.3])
+ARITHMETIC = sorted(
+    n
+    for n, op in TABLE.items()
+    if n.startswith(("math_", "vector_", "blend_", "mix_", "mapping")) and len(op[1]) == 1 and op[3] < 2
+)
+
+
+@settings(max_examples=800, deadline=None)
+@given(
+    st.sampled_from(ARITHMETIC), st.lists(st.tuples(SPECIAL, SPECIAL, SPECIAL, st.booleans()), min_size=6, max_size=6)
+)
+def test_what_leaves_a_value_as_it_is_is_passed_by(name, inputs):
+    """The same op with some inputs constant (where a sum with 0 or a mix of one side is left out) and with none."""
+    _, outputs, widths, immediates = TABLE[name]
+    if "vector_transform" in name or name == "vector_displacement":
+        return
+
+    def build(all_vary):
+        def make(builder):
+            one = builder.op("ray_kind", imm=(1,))
+            values = []
+            for (x, y, z, varies), width in zip(inputs, widths, strict=False):
+                value = builder.constant(x) if width == "f" else builder.constant(x, y, z)
+                if varies or all_vary:
+                    # 1 and 0 that are not known to be so, or they would be left out as well
+                    value = (
+                        builder.op("math_multiply", value, one)
+                        if width == "f"
+                        else builder.op("vector_scale", value, one)
+                    )
+                values.append(value)
+            made = builder.op(name, *values, imm=(0,) * immediates)
+            return builder.op("combine", made, made, made) if outputs == "f" else made
+
+        return make
+
+    assert emitted(build(False)).tolist() == pytest.approx(emitted(build(True)).tolist(), rel=1e-6, nan_ok=True)
+
+
 @pytest.mark.parametrize("name", [name for name, op in sorted(TABLE.items()) if not op[1] and "f" in op[2]])
 def test_closures_of_what_is_not_a_number(name):
     """One input after the other not a number, the others one half: run or refused."""

@@ -1,6 +1,7 @@
 // Ops that make normals and tangents: normal maps, bumps from heights at shifted points, displacement as bump.
 #include "scene/object_space.h"
 #include "scene/scene.h"
+#include "shading/identities.h"
 #include "shading/op_helpers.h"
 #include "shading/ops.h"
 
@@ -163,9 +164,9 @@ const Op kOps[] = {
     {"normal_map_space", "v", "vf", 3, OpKind::kContext, normal_map_space},
     {"bump_shift", "vvv", "f", 1, OpKind::kShift, bump_shift},
     {"bump_restore", "", "vvv", 0, OpKind::kRestore, bump_restore},
-    {"bump", "v", "ffffffv", 1, OpKind::kContext, bump},
+    {"bump", "v", "ffffffv", 1, OpKind::kContext, bump, 0, nullptr, identity::bump},
     {"set_normal", "", "v", 0, OpKind::kControl, set_normal},
-    {"displacement", "v", "fffv", 1, OpKind::kContext, displacement},
+    {"displacement", "v", "fffv", 1, OpKind::kContext, displacement, 0, nullptr, identity::displacement},
     {"vector_displacement", "v", "vff", 2, OpKind::kContext, vector_displacement},
     {"tangent_uv", "v", "", 1, OpKind::kContext, tangent_uv},
     {"tangent_radial", "v", "v", 1, OpKind::kContext, tangent_radial},

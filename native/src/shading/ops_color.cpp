@@ -1,4 +1,5 @@
 // Ops on colours: blend modes under Blender's names, hue and lightness, gamma, contrast, ramps, colours of light sources.
+#include "shading/identities.h"
 #include "shading/op_helpers.h"
 #include "shading/ops.h"
 #include "shading/spectrum.h"
@@ -154,22 +155,27 @@ void wavelength(const Operands& o, ShadeState&) { o.set(0, wavelength_color(o.f(
 
 constexpr OpKind kPure = OpKind::kPure;
 const Op kOps[] = {
-    {"blend_mix", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return mix(a, b, t); }>},
-    {"blend_darken", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return lerp(a, std::min(a, b), t); }>},
-    {"blend_multiply", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return a * (1.0f - t + t * b); }>},
+    {"blend_mix", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return mix(a, b, t); }>, 0, nullptr, identity::mix},
+    {"blend_darken", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return lerp(a, std::min(a, b), t); }>, 0, nullptr,
+     identity::blend},
+    {"blend_multiply", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return a * (1.0f - t + t * b); }>, 0, nullptr,
+     identity::blend},
     {"blend_burn", "v", "fvv", 0, kPure, blend<burn>},
-    {"blend_lighten", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return lerp(a, std::max(a, b), t); }>},
+    {"blend_lighten", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return lerp(a, std::max(a, b), t); }>, 0, nullptr,
+     identity::blend},
     {"blend_screen", "v", "fvv", 0, kPure,
      blend<[](float t, float a, float b) { return 1.0f - (1.0f - t + t * (1.0f - b)) * (1.0f - a); }>},
     {"blend_dodge", "v", "fvv", 0, kPure, blend<dodge>},
-    {"blend_add", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return a + t * b; }>},
+    {"blend_add", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return a + t * b; }>, 0, nullptr, identity::blend},
     {"blend_overlay", "v", "fvv", 0, kPure, blend<overlay>},
     {"blend_soft_light", "v", "fvv", 0, kPure, blend<soft_light>},
-    {"blend_linear_light", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return a + t * (2.0f * b - 1.0f); }>},
-    {"blend_difference", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return lerp(a, std::abs(a - b), t); }>},
+    {"blend_linear_light", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return a + t * (2.0f * b - 1.0f); }>, 0, nullptr,
+     identity::blend},
+    {"blend_difference", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return lerp(a, std::abs(a - b), t); }>, 0, nullptr,
+     identity::blend},
     {"blend_exclusion", "v", "fvv", 0, kPure,
      blend<[](float t, float a, float b) { return std::max(lerp(a, a + b - 2.0f * a * b, t), 0.0f); }>},
-    {"blend_subtract", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return a - t * b; }>},
+    {"blend_subtract", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return a - t * b; }>, 0, nullptr, identity::blend},
     {"blend_divide", "v", "fvv", 0, kPure, blend<[](float t, float a, float b) { return b != 0.0f ? (1.0f - t) * a + t * a / b : a; }>},
     {"blend_hue", "v", "fvv", 0, kPure, blend_hsv<blend_hue>},
     {"blend_saturation", "v", "fvv", 0, kPure, blend_hsv<blend_saturation>},
@@ -181,7 +187,7 @@ const Op kOps[] = {
     {"hsl_to_rgb", "v", "v", 0, kPure, convert<hsl_to_rgb>},
     {"gamma", "v", "vf", 0, kPure, gamma},
     {"bright_contrast", "v", "vff", 0, kPure, bright_contrast},
-    {"invert", "v", "fv", 0, kPure, invert},
+    {"invert", "v", "fv", 0, kPure, invert, 0, nullptr, identity::changed},
     {"hue_saturation", "v", "ffffv", 0, kPure, hue_saturation},
     {"color_ramp", "vf", "f", 3, kPure, color_ramp, 0, curve_fits<4>},
     {"blackbody", "v", "f", 0, kPure, blackbody},

@@ -1,4 +1,5 @@
 // Ops on numbers: the Math node's operations under Blender's names, map range, clamp, curves, and conversions between widths.
+#include "shading/identities.h"
 #include "shading/op_helpers.h"
 #include "shading/ops.h"
 #include "shading/tables.h"
@@ -74,14 +75,15 @@ const Op kOps[] = {
     {"clamp_minmax", "f", "fff", 0, kPure, float_op3<clamp_to>},
     {"clamp_range", "f", "fff", 0, kPure, clamp_range},
     {"saturate", "f", "f", 0, kPure, float_op1<[](float a) { return clamp01(a); }>},
-    {"mix_float", "f", "fff", 0, kPure, mix_float},
-    {"float_curve", "f", "ff", 5, kPure, float_curve, 0, curve_fits<1>},
-    {"math_add", "f", "ff", 0, kPure, float_op2<[](float a, float b) { return a + b; }>},
-    {"math_subtract", "f", "ff", 0, kPure, float_op2<[](float a, float b) { return a - b; }>},
-    {"math_multiply", "f", "ff", 0, kPure, float_op2<[](float a, float b) { return a * b; }>},
-    {"math_divide", "f", "ff", 0, kPure, float_op2<safe_divide>},
-    {"math_multiply_add", "f", "fff", 0, kPure, float_op3<[](float a, float b, float c) { return a * b + c; }>},
-    {"math_power", "f", "ff", 0, kPure, float_op2<safe_power>},
+    {"mix_float", "f", "fff", 0, kPure, mix_float, 0, nullptr, identity::mix},
+    {"float_curve", "f", "ff", 5, kPure, float_curve, 0, curve_fits<1>, identity::changed},
+    {"math_add", "f", "ff", 0, kPure, float_op2<[](float a, float b) { return a + b; }>, 0, nullptr, identity::sum<false>},
+    {"math_subtract", "f", "ff", 0, kPure, float_op2<[](float a, float b) { return a - b; }>, 0, nullptr, identity::difference<false>},
+    {"math_multiply", "f", "ff", 0, kPure, float_op2<[](float a, float b) { return a * b; }>, 0, nullptr, identity::product<false>},
+    {"math_divide", "f", "ff", 0, kPure, float_op2<safe_divide>, 0, nullptr, identity::quotient<false>},
+    {"math_multiply_add", "f", "fff", 0, kPure, float_op3<[](float a, float b, float c) { return a * b + c; }>, 0, nullptr,
+     identity::product_and_sum<false>},
+    {"math_power", "f", "ff", 0, kPure, float_op2<safe_power>, 0, nullptr, identity::power},
     {"math_logarithm", "f", "ff", 0, kPure, float_op2<logarithm>},
     {"math_sqrt", "f", "f", 0, kPure, float_op1<safe_sqrt>},
     {"math_inverse_sqrt", "f", "f", 0, kPure, float_op1<[](float a) { return (a > 0.0f) ? 1.0f / std::sqrt(a) : 0.0f; }>},

@@ -1,4 +1,5 @@
 // Ops on vectors: the Vector Math node's operations under Blender's names, rotation, mapping, map range, mix and curves.
+#include "shading/identities.h"
 #include "shading/op_helpers.h"
 #include "shading/ops.h"
 #include "shading/tables.h"
@@ -135,20 +136,21 @@ void radial_tiling(const Operands& o, ShadeState&) {
 }
 
 const Op kOps[] = {
-    {"vector_add", "v", "vv", 0, kPure, vector_op2<[](Vec3 a, Vec3 b) { return a + b; }>},
-    {"vector_subtract", "v", "vv", 0, kPure, vector_op2<[](Vec3 a, Vec3 b) { return a - b; }>},
-    {"vector_multiply", "v", "vv", 0, kPure, vector_op2<[](Vec3 a, Vec3 b) { return a * b; }>},
-    {"vector_divide", "v", "vv", 0, kPure, vector_op2<divide>},
-    {"vector_multiply_add", "v", "vvv", 0, kPure, vector_op3<[](Vec3 a, Vec3 b, Vec3 c) { return a * b + c; }>},
+    {"vector_add", "v", "vv", 0, kPure, vector_op2<[](Vec3 a, Vec3 b) { return a + b; }>, 0, nullptr, identity::sum<true>},
+    {"vector_subtract", "v", "vv", 0, kPure, vector_op2<[](Vec3 a, Vec3 b) { return a - b; }>, 0, nullptr, identity::difference<true>},
+    {"vector_multiply", "v", "vv", 0, kPure, vector_op2<[](Vec3 a, Vec3 b) { return a * b; }>, 0, nullptr, identity::product<true>},
+    {"vector_divide", "v", "vv", 0, kPure, vector_op2<divide>, 0, nullptr, identity::quotient<true>},
+    {"vector_multiply_add", "v", "vvv", 0, kPure, vector_op3<[](Vec3 a, Vec3 b, Vec3 c) { return a * b + c; }>, 0, nullptr,
+     identity::product_and_sum<true>},
     {"vector_cross_product", "v", "vv", 0, kPure, vector_op2<cross>},
     {"vector_project", "v", "vv", 0, kPure, vector_op2<project>},
     {"vector_reflect", "v", "vv", 0, kPure, vector_op2<reflect_incident>},
     {"vector_refract", "v", "vvf", 0, kPure, refract_incident},
     {"vector_faceforward", "v", "vvv", 0, kPure, vector_op3<face_forward>},
-    {"vector_dot_product", "f", "vv", 0, kPure, vector_op2<dot>},
+    {"vector_dot_product", "f", "vv", 0, kPure, vector_op2<dot>, 0, nullptr, identity::dot_product},
     {"vector_distance", "f", "vv", 0, kPure, vector_op2<[](Vec3 a, Vec3 b) { return length(a - b); }>},
     {"vector_length", "f", "v", 0, kPure, vector_op1<[](Vec3 a) { return length(a); }>},
-    {"vector_scale", "v", "vf", 0, kPure, scale},
+    {"vector_scale", "v", "vf", 0, kPure, scale, 0, nullptr, identity::scaled},
     {"vector_normalize", "v", "v", 0, kPure, vector_op1<normalize>},
     {"vector_absolute", "v", "v", 0, kPure, component_op1<[](float a) { return std::abs(a); }>},
     {"vector_power", "v", "vv", 0, kPure, component_op2<safe_power>},
@@ -166,15 +168,15 @@ const Op kOps[] = {
     {"vector_cosine", "v", "v", 0, kPure, component_op1<[](float a) { return std::cos(a); }>},
     {"vector_tangent", "v", "v", 0, kPure, component_op1<[](float a) { return std::tan(a); }>},
     {"euler_rows", "vvv", "v", 0, kPure, euler_rows},
-    {"mapping", "v", "vvvvvv", 1, kPure, mapping},
+    {"mapping", "v", "vvvvvv", 1, kPure, mapping, 0, nullptr, identity::mapping},
     {"rotate_rows", "v", "vvvvv", 1, kPure, rotate_rows},
     {"rotate_axis", "v", "vvvf", 0, kPure, rotate_axis},
     {"radial_tiling", "vfff", "vff", 1, kPure, radial_tiling},
     {"map_range_vector", "v", "vvvvvv", 2, kPure, map_range_vector},
     {"saturate_vector", "v", "v", 0, kPure, component_op1<[](float a) { return clamp01(a); }>},
-    {"mix_vector", "v", "fvv", 0, kPure, mix_vector},
+    {"mix_vector", "v", "fvv", 0, kPure, mix_vector, 0, nullptr, identity::mix},
     {"mix_vector_each", "v", "vvv", 0, kPure, component_op3<[](float t, float a, float b) { return mix(a, b, t); }>},
-    {"curves", "v", "fv", 5, kPure, curves, 0, curve_fits<3>},
+    {"curves", "v", "fv", 5, kPure, curves, 0, curve_fits<3>, identity::changed},
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Programs: checking at the border, folding of constants, the interpreter, and the parts that answer one question.
+// Programs: checking at the border, the interpreter, and the parts that answer one question.
 #include "shading/program.h"
 
 #include <algorithm>
@@ -98,93 +98,6 @@ void Program::run_code(float* registers, ShadeState& state) const {
   }
 }
 
-// Pure ops whose inputs are constant are run once, here; what they give joins the constants. A register that is written
-// more than once (in the arms of a jump) is left alone.
-void Program::fold_constants() {
-  std::vector<int> writes(size_t(register_count_), 0);
-  for_each_instruction(code_, [&](size_t, const Instruction& i) {
-    i.for_outputs([&](int32_t slot, int width) {
-      for (int k = 0; k < width; ++k) ++writes[size_t(slot + k)];
-    });
-  });
-  std::vector<float> values(size_t(register_count_), 0.0f);
-  std::copy(constants_.begin(), constants_.end(), values.begin());
-  std::vector<bool> known(size_t(register_count_), false);
-  std::fill_n(known.begin(), constants_.size(), true);
-  std::vector<bool> folded(code_.size() + 1, false);
-  bool any = false;
-  size_t skipped_until = 0;
-  for_each_instruction(code_, [&](size_t at, const Instruction& i) {
-    if (at < skipped_until) {
-      folded[at] = true;
-      return;
-    }
-    if (code_[at] == kJump && known[size_t(code_[at + 1])]) {
-      if (values[size_t(code_[at + 1])] == 0.0f) skipped_until = size_t(code_[at + 2]);
-      folded[at] = any = true;
-      return;
-    }
-    bool constant = i.op.kind == OpKind::kPure;
-    i.for_inputs([&](int32_t slot, int width) {
-      for (int k = 0; k < width; ++k) constant = constant && known[size_t(slot + k)];
-    });
-    i.for_outputs([&](int32_t slot, int width) {
-      for (int k = 0; k < width; ++k) constant = constant && writes[size_t(slot + k)] == 1;
-    });
-    if (!constant) return;
-    ShadingPoint nowhere;
-    static const ShaderResources nothing{};
-    ShadeState state{nowhere, nothing, tables_.data(), nullptr};
-    i.op.run(Operands{i.operands, values.data()}, state);
-    i.for_outputs([&](int32_t slot, int width) {
-      for (int k = 0; k < width; ++k) known[size_t(slot + k)] = true;
-    });
-    folded[at] = any = true;
-  });
-  if (any) keep([&](size_t at, const Instruction&) { return !folded[at]; }, values, known);
-}
-
-// Rebuilds the program from the instructions that `wanted` keeps, with all known registers moved to the front as constants.
-template <class Wanted>
-void Program::keep(const Wanted& wanted, const std::vector<float>& values, const std::vector<bool>& known) {
-  std::vector<bool> used(values.size(), false);
-  for_each_instruction(code_, [&](size_t at, const Instruction& i) {
-    if (!wanted(at, i)) return;
-    const auto use = [&](int32_t slot, int width) {
-      std::fill_n(used.begin() + slot, width, true);
-      for (int k = 1; k < width; ++k)  // or they would not stay together
-        require(known[size_t(slot + k)] == known[size_t(slot)], "the node program of '" + name_ + "' reads across two values");
-    };
-    i.for_outputs(use), i.for_inputs(use);
-  });
-  // Renumber: known registers first. The three of a vector stay together because all are known or none is.
-  std::vector<int32_t> place(values.size(), 0);
-  std::vector<float> constants;
-  int32_t next = 0;
-  for (size_t r = 0; r < place.size(); ++r)
-    if (known[r] && used[r]) place[r] = next++, constants.push_back(values[r]);
-  for (size_t r = 0; r < place.size(); ++r)
-    if (!known[r] && used[r]) place[r] = next++;
-
-  std::vector<int32_t> code;
-  std::vector<int32_t> moved(code_.size() + 1);
-  std::vector<size_t> jumps;
-  for_each_instruction(code_, [&](size_t at, const Instruction& i) {
-    moved[at] = int32_t(code.size());
-    if (!wanted(at, i)) return;
-    const size_t start = code.size();
-    code.insert(code.end(), code_.begin() + ptrdiff_t(at), code_.begin() + ptrdiff_t(at) + i.op.width());
-    const int registers = int(std::strlen(i.op.outputs) + std::strlen(i.op.inputs));
-    for (int k = 0; k < registers; ++k) code[start + 1 + size_t(k)] = place[size_t(code[start + 1 + size_t(k)])];
-    if (code_[at] == kJump) jumps.push_back(start);
-  });
-  moved[code_.size()] = int32_t(code.size());
-  for (const size_t j : jumps) code[j + 2] = moved[size_t(code[j + 2])];
-  code_ = std::move(code);
-  constants_ = std::move(constants);
-  register_count_ = next;
-}
-
 // The ops that ask for the view, and the closures that set themselves up for it.
 constexpr const char* kViewOps[] = {
     "incoming",      "object_incoming", "ambient_occlusion", "bevel",       "reflection",  "ray_kind",    "ray_length",  "ray_depth",
@@ -260,42 +173,6 @@ std::optional<Rgb> Program::find_constant_emission() const {
   bsdf.clear(nowhere.ng, nowhere.ns);
   emission_->run(nowhere, ShaderResources{}, &bsdf);
   return bsdf.emission;
-}
-
-// Keeps the closures with one of `effects`, what they depend on, and control: read backwards, an instruction is needed if
-// something later that is kept reads what it writes.
-void Program::drop_all_but(uint8_t effects) {
-  std::vector<size_t> order;
-  for_each_instruction(code_, [&](size_t at, const Instruction&) { order.push_back(at); });
-  std::vector<bool> needed(size_t(register_count_), false), kept(code_.size() + 1, false);
-  std::vector<size_t> restore(size_t(register_count_), 0);  // where a shifted point goes back, by what the shift saved
-  size_t next_kept = code_.size();
-  for (size_t n = order.size(); n-- > 0;) {
-    const size_t at = order[n];
-    const Op& op = ops()[size_t(code_[at])];
-    const Instruction i{op, code_.data() + at + 1};
-    bool keep_it = op.kind == OpKind::kControl || (op.kind == OpKind::kClosure && (op.effects & effects));
-    i.for_outputs([&](int32_t slot, int width) {
-      for (int k = 0; k < width; ++k) keep_it = keep_it || needed[size_t(slot + k)];
-    });
-    if (code_[at] == kJump) keep_it = next_kept < size_t(code_[at + 2]);
-    if (op.kind == OpKind::kRestore) restore[size_t(i.operands[0])] = at;
-    if (op.kind == OpKind::kShift) {
-      const size_t back = restore[size_t(i.operands[0])];
-      keep_it = next_kept < back;
-      if (keep_it) kept[back] = true;
-    }
-    if (!keep_it) continue;
-    kept[at] = true, next_kept = at;
-    i.for_inputs([&](int32_t slot, int width) {
-      for (int k = 0; k < width; ++k) needed[size_t(slot + k)] = true;
-    });
-  }
-  std::vector<bool> known(size_t(register_count_), false);
-  std::fill_n(known.begin(), constants_.size(), true);
-  std::vector<float> values(size_t(register_count_), 0.0f);
-  std::copy(constants_.begin(), constants_.end(), values.begin());
-  keep([&](size_t at, const Instruction&) { return bool(kept[at]); }, values, known);
 }
 
 std::shared_ptr<Program> Program::reduced_to(uint8_t effects) const {

@@ -63,6 +63,16 @@ enum class OpKind : uint8_t {
 // What a closure op adds, for the programs specialised to one question, and whether it looks at the point to do so.
 enum ClosureEffect : uint8_t { kAddsLobe = 1, kAddsEmission = 2, kAddsTransparency = 4, kSeesPoint = 8, kAddsAov = 16, kMayMirror = 32 };
 
+// The inputs of an op that are constant, by operand.
+struct KnownInputs {
+  const Operands& operands;
+  const uint8_t* known;  // by operand
+  bool is(int i, float x) const { return known[i] && operands.f(i) == x; }
+  bool is(int i, Vec3 x) const { return known[i] && operands.v(i) == x; }
+};
+// What an op gives whatever its other inputs are, where some are constant: one of its operands as it is, or zero.
+inline constexpr int kNothingKnown = -1, kZero = -2;
+
 struct Op {
   const char* name;
   const char* outputs;  // 'f' or 'v' each
@@ -73,6 +83,8 @@ struct Op {
   uint8_t effects = 0;
   // Whether the immediates are in order, given the size of the program's tables; null: any are.
   bool (*accepts)(const int32_t* immediates, size_t tables) = nullptr;
+  // Of ops with one output: the operand that it equals, kZero or kNothingKnown.
+  int (*equals)(const KnownInputs&) = nullptr;
   int width() const { return 1 + int(std::strlen(outputs)) + int(std::strlen(inputs)) + immediates; }
 };
 
@@ -118,7 +130,7 @@ class Program {
 
  private:
   void check() const;
-  void fold_constants();
+  void fold_constants();  // program_folding.cpp
   template <class Wanted>
   void keep(const Wanted& wanted, const std::vector<float>& values, const std::vector<bool>& known);
   void drop_all_but(uint8_t effects);

@@ -1,6 +1,8 @@
 // The hash functions that Blender's textures are defined by; other ones would give other pictures.
 // Jenkins' lookup3 for floats and noise lattices, signed PCG [Jarzynski & Olano 2020] for Voronoi cells.
 #pragma once
+#include <algorithm>
+#include <array>
 #include <bit>
 
 #include "shading/textures/point.h"
@@ -64,32 +66,68 @@ inline float hash_value(Point<2> p) { return hash01(p[0], p[1]); }
 inline float hash_value(Point<3> p) { return hash01(p[0], p[1], p[2]); }
 inline float hash_value(Point<4> p) { return hash01(p[0], p[1], p[2], p[3]); }
 
-inline Point<2> hash_point(Point<2> p) { return {{hash01(p[0], p[1]), hash01(p[0], p[1], 1.0f)}}; }
-inline Point<3> hash_point(Point<3> p) {
-  const Rgb c = hash_rgb(p);
-  return {{c.r(), c.g(), c.b()}};
-}
-inline Point<4> hash_point(Point<4> p) {
-  return {{hash01(p[0], p[1], p[2], p[3]), hash01(p[3], p[0], p[1], p[2]), hash01(p[2], p[3], p[0], p[1]), hash01(p[1], p[2], p[3], p[0])}};
+// A point from the hash of a point's bits, each coordinate in [0, 1], for `Lanes` of them at once.
+template <int Lanes>
+struct PointHash {
+  static void run(const uint32_t (&p)[2][Lanes], float (&out)[2][Lanes]) {
+    hash01<2>({p[0], p[1]}, out[0]);
+    with_number<3>({p[0], p[1]}, 1.0f, out[1]);
+  }
+  static void run(const uint32_t (&p)[3][Lanes], float (&out)[3][Lanes]) {
+    hash01<3>({p[0], p[1], p[2]}, out[0]);
+    for (int i = 1; i < 3; ++i) with_number<4>({p[0], p[1], p[2]}, float(i), out[i]);
+  }
+  static void run(const uint32_t (&p)[4][Lanes], float (&out)[4][Lanes]) {
+    for (int i = 0; i < 4; ++i) hash01<4>({p[(4 - i) % 4], p[(5 - i) % 4], p[(6 - i) % 4], p[(7 - i) % 4]}, out[i]);
+  }
+
+ private:
+  template <int N>
+  static void hash01(std::array<const uint32_t*, N> p, float (&out)[Lanes]) {
+    uint32_t keys[N][Lanes];
+    for (int d = 0; d < N; ++d) std::copy_n(p[d], Lanes, keys[d]);
+    Jenkins<N, Lanes> h;
+    h.run(keys);
+    for (int l = 0; l < Lanes; ++l) out[l] = float(h.c[l]) * (1.0f / float(0xffffffffu));
+  }
+  template <int N>
+  static void with_number(std::array<const uint32_t*, N - 1> p, float number, float (&out)[Lanes]) {
+    uint32_t last[Lanes];
+    std::fill_n(last, Lanes, std::bit_cast<uint32_t>(number));
+    std::array<const uint32_t*, N> all;
+    std::copy_n(p.begin(), N - 1, all.begin()), all[N - 1] = last;
+    hash01<N>(all, out);
+  }
+};
+
+// PCG in 2 to 4 dimensions with arithmetic shifts, 31 bits out, for `Lanes` cells at once.
+template <int N, int Lanes>
+void hash_cells(const int32_t (&cells)[N][Lanes], float (&out)[N][Lanes]) {
+  static_assert(N >= 2 && N <= 4);
+  for (int l = 0; l < Lanes; ++l) {
+    uint32_t v[4] = {};
+    for (int i = 0; i < N; ++i) v[i] = uint32_t(cells[i][l]) * 1664525u + 1013904223u;
+    const auto stir = [&v] {
+      if constexpr (N == 2) v[0] += v[1] * 1664525u, v[1] += v[0] * 1664525u;
+      if constexpr (N == 3) v[0] += v[1] * v[2], v[1] += v[2] * v[0], v[2] += v[0] * v[1];
+      if constexpr (N == 4) v[0] += v[1] * v[3], v[1] += v[2] * v[0], v[2] += v[0] * v[1], v[3] += v[1] * v[2];
+    };
+    stir();
+    for (int i = 0; i < N; ++i) v[i] ^= uint32_t(int32_t(v[i]) >> 16);
+    stir();
+    for (int i = 0; i < N; ++i) out[i][l] = float(int32_t(v[i] & 0x7fffffffu)) * (1.0f / float(0x7fffffffu));
+  }
 }
 
-// PCG in 2 to 4 dimensions with arithmetic shifts, 31 bits out.
 template <int N>
 Point<N> hash_cell(const int32_t (&cell)[N]) {
-  static_assert(N >= 2 && N <= 4);
-  uint32_t v[4] = {};
-  for (int i = 0; i < N; ++i) v[i] = uint32_t(cell[i]) * 1664525u + 1013904223u;
-  const auto stir = [&v] {
-    if constexpr (N == 2) v[0] += v[1] * 1664525u, v[1] += v[0] * 1664525u;
-    if constexpr (N == 3) v[0] += v[1] * v[2], v[1] += v[2] * v[0], v[2] += v[0] * v[1];
-    if constexpr (N == 4) v[0] += v[1] * v[3], v[1] += v[2] * v[0], v[2] += v[0] * v[1], v[3] += v[1] * v[2];
-  };
-  stir();
-  for (int i = 0; i < N; ++i) v[i] ^= uint32_t(int32_t(v[i]) >> 16);
-  stir();
-  Point<N> out;
-  for (int i = 0; i < N; ++i) out[i] = float(int32_t(v[i] & 0x7fffffffu)) * (1.0f / float(0x7fffffffu));
-  return out;
+  int32_t cells[N][1];
+  float out[N][1];
+  for (int i = 0; i < N; ++i) cells[i][0] = cell[i];
+  hash_cells(cells, out);
+  Point<N> point;
+  for (int i = 0; i < N; ++i) point[i] = out[i][0];
+  return point;
 }
 
 }  // namespace gi::texture

@@ -39,7 +39,7 @@ struct Cell {
   }
 };
 
-// A neighbouring cell's feature point: relative to the middle cell, at `offset` cells from it.
+// A cell's feature point: relative to the middle cell, at `offset` cells from it.
 template <int N>
 struct Feature {
   int offset[N];
@@ -47,49 +47,16 @@ struct Feature {
 };
 
 template <int N>
-Point<N> cell_key(const Cell<N>& cell, const int (&offset)[N]) {
-  Point<N> key;
-  for (int d = 0; d < N; ++d) key[d] = cell.floor[d] + float(offset[d]);
-  return key;
-}
-template <int N>
-Point<N> jitter(const Cell<N>& cell, const int (&offset)[N], bool float_hash) {
-  if constexpr (N == 1) {
-    return {{hash_value(cell_key(cell, offset))}};
-  } else {
-    if (float_hash) return hash_point(cell_key(cell, offset));
-    int32_t index[N];
-    for (int d = 0; d < N; ++d) index[d] = int32_t(uint32_t(cell.index[d]) + uint32_t(offset[d]));
-    return hash_cell(index);
-  }
-}
-template <int N>
 Rgb cell_color(const Cell<N>& cell, const int (&offset)[N], bool float_hash) {
-  if (N == 1 || float_hash) return hash_rgb(cell_key(cell, offset));
+  if (N == 1 || float_hash) {
+    Point<N> key;
+    for (int d = 0; d < N; ++d) key[d] = cell.floor[d] + float(offset[d]);
+    return hash_rgb(key);
+  }
   int32_t index[N < 3 ? 3 : N] = {};  // two dimensions hash as three
   for (int d = 0; d < N; ++d) index[d] = int32_t(uint32_t(cell.index[d]) + uint32_t(offset[d]));
   const auto h = hash_cell(index);
   return {h[0], h[1], h[2]};
-}
-
-// f(feature) for the cells at most `Reach` away from `middle`, in the order that ties are broken by.
-template <int Reach, int N, class F>
-void for_each_feature(const Cell<N>& cell, const int (&middle)[N], const VoronoiSettings& s, F f) {
-  constexpr int kSide = 2 * Reach + 1;
-  int count = 1;
-  for (int d = 0; d < N; ++d) count *= kSide;
-  for (int i = 0; i < count; ++i) {
-    Feature<N> feature;
-    for (int d = 0, rest = i; d < N; ++d, rest /= kSide) feature.offset[d] = rest % kSide - Reach + middle[d];
-    const Point<N> j = jitter(cell, feature.offset, s.float_hash);
-    for (int d = 0; d < N; ++d) feature.point[d] = float(feature.offset[d]) + j[d] * s.randomness;
-    f(feature);
-  }
-}
-template <int Reach, int N, class F>
-void for_each_feature(const Cell<N>& cell, const VoronoiSettings& s, F f) {
-  const int middle[N] = {};
-  for_each_feature<Reach>(cell, middle, s, f);
 }
 
 template <int N>
@@ -122,50 +89,141 @@ float distance_order(Point<N> a, Point<N> b, const VoronoiSettings& s) {
   return sum;
 }
 
+constexpr int power(int base, int exponent) { return exponent == 0 ? 1 : base * power(base, exponent - 1); }
+
+// Offsets of the cells at most `Reach` away, in the order that ties are broken by.
+template <int Reach, int N>
+struct Neighbours {
+  static constexpr int kSide = 2 * Reach + 1, kCount = power(kSide, N), kLanes = (kCount + 3) / 4 * 4;
+  int32_t offset[N][kLanes] = {};
+  constexpr Neighbours() {
+    for (int i = 0; i < kCount; ++i)
+      for (int d = 0, rest = i; d < N; ++d, rest /= kSide) offset[d][i] = rest % kSide - Reach;
+  }
+};
+template <int Reach, int N>
+inline constexpr Neighbours<Reach, N> kNeighbours;
+
+// The feature points of the cells at most `Reach` away from `middle`; plain loops over all of them at once.
+template <int Reach, int N>
+class Features {
+ public:
+  static constexpr int kCount = Neighbours<Reach, N>::kCount, kLanes = Neighbours<Reach, N>::kLanes;
+
+  Features(const Cell<N>& cell, const VoronoiSettings& s, const int (&middle)[N] = {}) {
+    for (int d = 0; d < N; ++d)
+      for (int i = 0; i < kLanes; ++i) offset_[d][i] = kNeighbours<Reach, N>.offset[d][i] + middle[d];
+    if constexpr (N == 1)
+      for (int i = 0; i < kLanes; ++i) jitter_[0][i] = hash01(cell.floor[0] + float(offset_[0][i]));
+    else if (s.float_hash)
+      hash_as_floats(cell);
+    else
+      hash_as_integers(cell);
+    for (int d = 0; d < N; ++d)
+      for (int i = 0; i < kLanes; ++i) point_[d][i] = float(offset_[d][i]) + jitter_[d][i] * s.randomness;
+  }
+  Point<N> point(int i) const {
+    Point<N> p;
+    for (int d = 0; d < N; ++d) p[d] = point_[d][i];
+    return p;
+  }
+  Feature<N> operator[](int i) const {
+    Feature<N> feature{{}, point(i)};
+    for (int d = 0; d < N; ++d) feature.offset[d] = offset_[d][i];
+    return feature;
+  }
+  Rgb color(const Cell<N>& cell, int i, bool float_hash) const {
+    if constexpr (N >= 3)
+      if (!float_hash) return {jitter_[0][i], jitter_[1][i], jitter_[2][i]};  // the same hash
+    return cell_color(cell, (*this)[i].offset, float_hash);
+  }
+  // `out` grows with the distance from `p` and is cheaper: enough to find the nearest.
+  void order(Point<N> p, const VoronoiSettings& s, float (&out)[kLanes]) const {
+    if (s.metric == VoronoiMetric::kEuclidean || N == 1)
+      squared_distances(p, out);
+    else
+      for (int i = 0; i < kCount; ++i) out[i] = distance_order(point(i), p, s);
+  }
+  void squared_distances(Point<N> p, float (&out)[kLanes]) const {
+    for (int i = 0; i < kLanes; ++i) {
+      float sum = 0;
+      for (int d = 0; d < N; ++d) sum += (point_[d][i] - p[d]) * (point_[d][i] - p[d]);
+      out[i] = sum;
+    }
+  }
+
+ private:
+  void hash_as_floats(const Cell<N>& cell) {
+    uint32_t keys[N][kLanes];
+    for (int d = 0; d < N; ++d)
+      for (int i = 0; i < kLanes; ++i) keys[d][i] = std::bit_cast<uint32_t>(cell.floor[d] + float(offset_[d][i]));
+    PointHash<kLanes>::run(keys, jitter_);
+  }
+  void hash_as_integers(const Cell<N>& cell) {
+    int32_t index[N][kLanes];
+    for (int d = 0; d < N; ++d)
+      for (int i = 0; i < kLanes; ++i) index[d][i] = int32_t(uint32_t(cell.index[d]) + uint32_t(offset_[d][i]));
+    hash_cells(index, jitter_);
+  }
+
+  int32_t offset_[N][kLanes];
+  float jitter_[N][kLanes], point_[N][kLanes];
+};
+
+// The first of the least.
+template <int Count, int Lanes>
+int least(const float (&x)[Lanes]) {
+  int best = 0;
+  for (int i = 1; i < Count; ++i)
+    if (x[i] < x[best]) best = i;
+  return best;
+}
+
+template <int N, int Reach>
+VoronoiSample<N> sample_at(const Cell<N>& cell, const Features<Reach, N>& features, int i, const VoronoiSettings& s) {
+  return {distance(features.point(i), cell.local, s), features.color(cell, i, s.float_hash), features.point(i) + cell.floor};
+}
+
 template <int N>
 VoronoiSample<N> nearest(Point<N> p, const VoronoiSettings& s) {
   const Cell<N> cell(p);
-  Feature<N> best{};
-  float best_order = kInf;
-  for_each_feature<1>(cell, s, [&](const Feature<N>& f) {
-    const float order = distance_order(f.point, cell.local, s);
-    if (order < best_order) best_order = order, best = f;
-  });
-  return {distance(best.point, cell.local, s), cell_color(cell, best.offset, s.float_hash), best.point + cell.floor};
+  const Features<1, N> features(cell, s);
+  float order[features.kLanes];
+  features.order(cell.local, s, order);
+  return sample_at(cell, features, least<features.kCount>(order), s);
 }
 
 template <int N>
 VoronoiSample<N> second_nearest(Point<N> p, const VoronoiSettings& s) {
   const Cell<N> cell(p);
-  Feature<N> first{}, second{};
-  float d1 = kInf, d2 = kInf;
-  for_each_feature<1>(cell, s, [&](const Feature<N>& f) {
-    const float d = distance_order(f.point, cell.local, s);
-    if (d < d1) {
-      d2 = d1, second = first;
-      d1 = d, first = f;
-    } else if (d < d2) {
-      d2 = d, second = f;
-    }
-  });
-  return {distance(second.point, cell.local, s), cell_color(cell, second.offset, s.float_hash), second.point + cell.floor};
+  const Features<1, N> features(cell, s);
+  float order[features.kLanes];
+  features.order(cell.local, s, order);
+  int first = 0, second = -1;
+  for (int i = 1; i < features.kCount; ++i) {
+    if (order[i] < order[first])
+      second = first, first = i;
+    else if (second < 0 || order[i] < order[second])
+      second = i;
+  }
+  return sample_at(cell, features, second, s);
 }
 
 // A minimum that blends where distances are within `smoothness` of each other; two cells far, or it would show seams.
 template <int N>
 VoronoiSample<N> smooth_nearest(Point<N> p, const VoronoiSettings& s) {
   const Cell<N> cell(p);
+  const Features<2, N> features(cell, s);
   VoronoiSample<N> sum;
-  bool first = true;
-  for_each_feature<2>(cell, s, [&](const Feature<N>& f) {
-    const float d = distance(f.point, cell.local, s);
-    const float t = first ? 1.0f : clamp01(0.5f + 0.5f * (sum.distance - d) / s.smoothness), h = t * t * (3.0f - 2.0f * t);
-    first = false;
-    const float dip = s.smoothness * h * (1.0f - h), soft_dip = dip / (1.0f + 3.0f * s.smoothness);
+  for (int i = 0; i < features.kCount; ++i) {
+    const float d = distance(features.point(i), cell.local, s);
+    const float t = i == 0 ? 1.0f : clamp01(0.5f + 0.5f * (sum.distance - d) / s.smoothness);
+    if (t == 0.0f) continue;  // too far to change anything, as most are
+    const float h = t * t * (3.0f - 2.0f * t), dip = s.smoothness * h * (1.0f - h), soft_dip = dip / (1.0f + 3.0f * s.smoothness);
     sum.distance = lerp(sum.distance, d, h) - dip;
-    sum.color = lerp(sum.color, cell_color(cell, f.offset, s.float_hash), h) - Rgb(soft_dip);
-    sum.position = map(lerp(sum.position, f.point, h), [soft_dip](float x) { return x - soft_dip; });
-  });
+    sum.color = lerp(sum.color, features.color(cell, i, s.float_hash), h) - Rgb(soft_dip);
+    sum.position = map(lerp(sum.position, features.point(i), h), [soft_dip](float x) { return x - soft_dip; });
+  }
   sum.position = sum.position + cell.floor;
   return sum;
 }
@@ -173,25 +231,21 @@ VoronoiSample<N> smooth_nearest(Point<N> p, const VoronoiSettings& s) {
 template <int N>
 float distance_to_edge(Point<N> p, const VoronoiSettings& s) {
   const Cell<N> cell(p);
+  const Features<1, N> features(cell, s);
   if constexpr (N == 1) {
-    const auto point = [&](int i) { return float(i) + hash01(cell.floor[0] + float(i)) * s.randomness; };
-    const float middle = point(0);
-    return std::min(std::abs((middle + point(-1)) * 0.5f - cell.local[0]), std::abs((middle + point(1)) * 0.5f - cell.local[0]));
+    const auto edge = [&](int i) { return std::abs((features.point(1)[0] + features.point(i)[0]) * 0.5f - cell.local[0]); };
+    return std::min(edge(0), edge(2));
   } else {
-    Point<N> closest;
-    float best = kInf;
-    for_each_feature<1>(cell, s, [&](const Feature<N>& f) {
-      const Point<N> v = f.point - cell.local;
-      const float d = dot(v, v);
-      if (d < best) best = d, closest = v;
-    });
+    float order[features.kLanes];
+    features.squared_distances(cell.local, order);
+    const Point<N> closest = features.point(least<features.kCount>(order)) - cell.local;
     // The edge to each other feature point is the plane half way to it.
     float edge = kInf;
-    for_each_feature<1>(cell, s, [&](const Feature<N>& f) {
-      const Point<N> v = f.point - cell.local, across = v - closest;
+    for (int i = 0; i < features.kCount; ++i) {
+      const Point<N> v = features.point(i) - cell.local, across = v - closest;
       const float l2 = dot(across, across);
       if (l2 > 0.0001f) edge = std::min(edge, dot((v + closest) * 0.5f, across) / std::sqrt(l2));
-    });
+    }
     return edge;
   }
 }
@@ -200,19 +254,14 @@ float distance_to_edge(Point<N> p, const VoronoiSettings& s) {
 template <int N>
 float sphere_radius(Point<N> p, const VoronoiSettings& s) {
   const Cell<N> cell(p);
-  Feature<N> closest{};
-  float best = kInf;
-  for_each_feature<1>(cell, s, [&](const Feature<N>& f) {
-    const float d = dot(f.point - cell.local, f.point - cell.local);
-    if (d < best) best = d, closest = f;
-  });
-  best = kInf;
-  for_each_feature<1>(cell, closest.offset, s, [&](const Feature<N>& f) {
-    bool same = true;
-    for (int d = 0; d < N; ++d) same = same && f.offset[d] == closest.offset[d];
-    if (!same) best = std::min(best, dot(f.point - closest.point, f.point - closest.point));
-  });
-  return std::sqrt(best) * 0.5f;
+  const Features<1, N> features(cell, s);
+  float order[features.kLanes];
+  features.squared_distances(cell.local, order);
+  const Feature<N> closest = features[least<features.kCount>(order)];
+  const Features<1, N> around(cell, s, closest.offset);
+  around.squared_distances(closest.point, order);
+  order[around.kCount / 2] = kInf;  // itself
+  return std::sqrt(order[least<around.kCount>(order)]) * 0.5f;
 }
 
 template <int N>
