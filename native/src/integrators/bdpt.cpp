@@ -512,7 +512,8 @@ std::vector<Parameter> with(std::vector<Parameter> others) {
 
 const Descriptor& bdpt_descriptor() {
   static const Descriptor descriptor{
-      "bdpt", "Bidirectional Path Tracing",
+      "bdpt",
+      "Bidirectional Path Tracing",
       "Paths from the eye and from the lights, joined in every way: for light that comes around corners and through glass; unbiased. "
       "Light Path nodes see diffuse rays where light arrives from a lamp's side",
       with({
@@ -533,7 +534,8 @@ const Descriptor& bdpt_descriptor() {
 
 const Descriptor& vcm_descriptor() {
   static const Descriptor descriptor{
-      "vcm", "Vertex Connection and Merging",
+      "vcm",
+      "Vertex Connection and Merging",
       "Bidirectional path tracing and progressive photon mapping as one: also caustics that are seen in mirrors and through glass. A "
       "little "
       "blurred at first, right in the end",
@@ -548,7 +550,8 @@ const Descriptor& vcm_descriptor() {
            "",
            {{"ALL", "All", "Vertices are connected and merged"},
             {"CONNECT", "Connection", "Bidirectional path tracing alone"},
-            {"MERGE", "Merging", "Progressive photon mapping alone; lights come to diffuse and glossy surfaces as photons only, which ray portals stop"}}},
+            {"MERGE", "Merging",
+             "Progressive photon mapping alone; lights come to diffuse and glossy surfaces as photons only, which ray portals stop"}}},
           {"photons", "Photons", Kind::kInt, 1000000, 1, 1e9,
            "Most light paths that are sent out in each pass for merging, no more than pixels: more make caustics seen in glass smooth "
            "sooner"},

@@ -212,7 +212,8 @@ class PathIntegrator final : public Integrator {
       }
 
       // Follow it. A transparent surface changes nothing but the throughput: the ray goes on as the one it was.
-      if (has_media && (next->flags & (kTransparent | kTransmission))) media.cross(context.scene, point, transparent ? -point.wo : next->wi);
+      if (has_media && (next->flags & (kTransparent | kTransmission)))
+        media.cross(context.scene, point, transparent ? -point.wo : next->wi);
       if (transparent) {
         const bool is_there = !context.scene.material(context.scene.material_of(point.instance, point.triangle)).only_volume;
         if (is_there && !advance(path.state, next->flags, s_.limits)) break;

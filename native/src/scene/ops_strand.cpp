@@ -1,4 +1,5 @@
-// Where fibres lie, for the hair nodes. On meshes that is along the first edge of each triangle, and across it along the last, as in Blender.
+// Where fibres lie, for the hair nodes. On meshes that is along the first edge of each triangle, and across it along the last, as in
+// Blender.
 #include "scene/object_space.h"
 #include "shading/ops.h"
 

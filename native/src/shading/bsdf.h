@@ -38,8 +38,8 @@ class Bsdf {
   Bsdf() {}  // entries_ stay uninitialised
   // `without`: CausticFlags, sides of glossy lobes to leave out.
   void clear(Vec3 ng, Vec3 ns, uint8_t without = 0) {
-    count_ = 0, subsurface_count_ = 0, portal_count_ = 0, flags_ = 0, chosen_ = kAll, ng_ = ng, ns_ = ns, without_ = without, emission = Rgb(),
-    transparency = Rgb(), holdout = Rgb();
+    count_ = 0, subsurface_count_ = 0, portal_count_ = 0, flags_ = 0, chosen_ = kAll, ng_ = ng, ns_ = ns, without_ = without,
+    emission = Rgb(), transparency = Rgb(), holdout = Rgb();
   }
   uint8_t without() const { return without_; }
   void set_geometric_normal(Vec3 ng) { ng_ = ng; }

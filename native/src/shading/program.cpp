@@ -100,10 +100,10 @@ void Program::run_code(float* registers, ShadeState& state) const {
 
 // The ops that ask for the view, and the closures that set themselves up for it.
 constexpr const char* kViewOps[] = {
-    "incoming",      "object_incoming", "ambient_occlusion", "bevel",       "reflection",  "ray_kind",    "ray_length",  "ray_depth",
-    "light_falloff", "fresnel",         "layer_weight",      "camera_data", "translucent", "sheen",       "velvet",      "glossy",
-    "refraction",    "glass",           "metallic",          "sheen_layer", "coat_layer",  "metal_layer", "glass_layer", "specular_layer",
-    "hair_strand",   "hair_chiang",     "hair_huang"};
+    "incoming",    "object_incoming", "ambient_occlusion", "bevel",        "reflection",  "ray_kind",    "ray_length",
+    "ray_depth",   "light_falloff",   "fresnel",           "layer_weight", "camera_data", "translucent", "sheen",
+    "velvet",      "glossy",          "refraction",        "glass",        "metallic",    "sheen_layer", "coat_layer",
+    "metal_layer", "glass_layer",     "specular_layer",    "hair_strand",  "hair_chiang", "hair_huang"};
 
 bool Program::uses(std::string_view name) const {
   bool found = false;

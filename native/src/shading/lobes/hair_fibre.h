@@ -14,7 +14,7 @@ inline float wrapped_angle(float a) { return a - 2.0f * kPi * std::floor((a + kP
 
 // ln I0(x), the modified Bessel function of order 0. [Abramowitz & Stegun 1964, 9.6.12 and 9.7.1]
 inline float log_bessel_i0(float x) {
-  if (x > 12.0f) return x + 0.5f * (1.0f / (8.0f * x) - std::log(2.0f * kPi * x));
+  if (x > 12.0f) return x - 0.5f * std::log(2.0f * kPi * x) + std::log(1.0f + (1.0f + 9.0f / (16.0f * x)) / (8.0f * x));
   const float q = 0.25f * x * x;
   float term = 1.0f, sum = 1.0f;
   for (int k = 1; k < 20; ++k) term *= q / float(k * k), sum += term;

@@ -108,8 +108,8 @@ class Fibre {
   Vec3 normal(float theta, float gamma) const { return direction(theta, phi_of_gamma(gamma, b_)); }
   float arc(float gamma) const { return b_ == 1.0f ? 1.0f : std::sqrt(1.0f - (1.0f - b_ * b_) * sqr(std::sin(gamma))); }
 
-  // The mean over the width that is seen by Simpson's rule in γ, with steps of about `step`: f(γ, weight). Over h, as the paper has it, rays
-  // that graze the fibre would count too much.
+  // The mean over the width that is seen by Simpson's rule in γ, with steps of about `step`: f(γ, weight). Over h, as the paper has it,
+  // rays that graze the fibre would count too much.
   template <class F>
   void over_width(float step, const F& f) const {
     const int n = 2 * std::max(int(std::ceil(0.5f * (to_ - from_) / step)), 1);
@@ -137,11 +137,11 @@ class Fibre {
   // A ray that has come in through one facet of the first interface.
   struct Inside {
     Vec3 t, meso, macro;  // its direction; normals where it meets the far side, both inwards
-    float gamma;          // of these
-    float energy;         // what came in
-    float amount;         // of that, per area of the far side; the weight of its place included
+    float gamma;  // of these
+    float energy;  // what came in
+    float amount;  // of that, per area of the far side; the weight of its place included
     Rgb absorbed;
-    float cos_in;         // to the mesonormal of the far side
+    float cos_in;  // to the mesonormal of the far side
   };
   std::optional<Inside> enter(float gamma, float weight, Vec2 u) const {
     const Vec3 meso = normal(m_.tilt, gamma), macro = normal(0.0f, gamma), h = facets_.sample(o_, meso, u);
@@ -272,9 +272,7 @@ struct Guess {
     float sum = share[kAnywhere] * 0.25f * kInvPi;
     for (int p = 0; p < kAnywhere; ++p) {
       const auto [s, c] = tilted(p);
-      const float n = p == kR    ? 0.25f * std::cos(0.5f * around)
-                      : p == kTt ? through.density(wrapped_angle(around - kPi))
-                                 : 0.5f * kInvPi;
+      const float n = p == kR ? 0.25f * std::cos(0.5f * around) : p == kTt ? through.density(wrapped_angle(around - kPi)) : 0.5f * kInvPi;
       sum += share[size_t(p)] * n * along_fibre(i.y, cos_i, s, c, variance[size_t(p)]);
     }
     return sum;

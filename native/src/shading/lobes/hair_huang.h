@@ -22,8 +22,9 @@ struct HairHuang {
     float r = 1, tt = 1, trt = 1;
   };
   static HairHuang make(const Look& l) {
-    return {l.sigma, std::max(l.r, 0.0f), std::max(l.tt, 0.0f), std::max(l.trt, 0.0f), std::clamp(l.roughness, 0.001f, 1.0f), -l.offset, l.eta,
-            l.aspect};
+    return {
+        l.sigma, std::max(l.r, 0.0f), std::max(l.tt, 0.0f), std::max(l.trt, 0.0f), std::clamp(l.roughness, 0.001f, 1.0f), -l.offset, l.eta,
+        l.aspect};
   }
   // As wide as the fibre looks from wo, over its long axis.
   float projected_radius(Vec3 wo) const;

@@ -54,7 +54,8 @@ struct HairStrand {
       const float sin_o = std::clamp(dot(s.tangent, wo), -1.0f, 1.0f);
       y = normalize_or(wo - s.tangent * sin_o, Frame::from_normal(s.tangent).x), x = cross(s.tangent, y);
       theta = std::asin(sin_o);
-      from = std::atan((0.5f * (theta - 0.5f * kPi) - s.offset) / s.along), to = std::atan((0.5f * (theta + 0.5f * kPi) - s.offset) / s.along);
+      from = std::atan((0.5f * (theta - 0.5f * kPi) - s.offset) / s.along),
+      to = std::atan((0.5f * (theta + 0.5f * kPi) - s.offset) / s.along);
     }
   };
   static bool is_along(float theta) { return 0.5f * kPi - std::abs(theta) < 1e-3f; }
