@@ -259,7 +259,8 @@ class PhotonMapIntegrator final : public Integrator {
                  seen_caustic = find_ends(context, film, s_.limits, false, kLooksAcross);
       const FilmSpec& spec = film.spec();
       SubpathSettings light;
-      light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height}, light.weighs = false;
+      light.limits = s_.limits, light.without = s_.without, light.footprint = {context.camera, spec.width, spec.height},
+      light.weighs = false;
       const uint8_t all = gathers() ? kAllPhotons : kGlobalPhoton;
       if (has_global) send(context, light, kGlobal, global_photons_, global_count_, all, seen_global, global_);
       light.only_by_mirrors = true;

@@ -142,11 +142,14 @@ EmissionGuide learn_emission(const RenderContext& context, const SubpathSettings
   // Once there is some of the wished light, the other kind does not count any longer: of a glass on a wide floor that would be nearly all.
   std::atomic<size_t> arrived = 0;  // paths that brought wished light
   bool shows_way = true;
+  int tried = 0;  // at most half as many as there will be photons, where there is nothing of the wished kind
   const double began = context.seconds();
   for (int round = 0; round < kMostRounds && !context.cancelled; ++round) {
-    if (round >= EmissionLearner::kFirstRounds && learner.size() > kEnough && !shows_way) break;
+    if (round >= EmissionLearner::kFirstRounds && learner.size() > kEnough && (!shows_way || tried >= photons / 2)) break;
     if (context.time_limit > 0.0 && context.seconds() - began > kTimeShare * context.time_limit) break;
-    learner.learn(context, settings, std::min(photons / 8, kFirstRound << round), [&](const LightVertices& path, Sampler&) {
+    const int trials = std::min(photons / 8, kFirstRound << round);
+    tried += trials;
+    learner.learn(context, settings, trials, [&](const LightVertices& path, Sampler&) {
       float wished = 0.0f, other = 0.0f;
       for (int i = 0; i < int(path.count()); ++i) {
         const LightVertex& v = path[size_t(i)];

@@ -128,8 +128,8 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
       if (!light || !(pdf_emit > 0.0f)) return;
       v.weights = PartialWeights();
       if (settings.weighs) {
-        // Densities of one path's two ends as sampled directly and by itself. [Georgiev 2012, eq. 31, 32 and 48 to 52, here per steradian and
-        // area at this vertex, which serves lights near and far alike]
+        // Densities of one path's two ends as sampled directly and by itself. [Georgiev 2012, eq. 31, 32 and 48 to 52, here per steradian
+        // and area at this vertex, which serves lights near and far alike]
         const float pdf_joined = pdf_emit * cos_in * settings.joined;
         v.weights.vcm = h(light->pdf_dir * context.lights.pick_probability(query, emitted->light) / pdf_joined);
         v.weights.vc = light->is_delta || !light->use_mis ? 0.0f : h(1.0f / pdf_joined);

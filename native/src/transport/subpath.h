@@ -107,7 +107,7 @@ struct SubpathSettings {
   float merges = 0;  // η of merging [Georgiev 2012, eq. 20] where a pixel has radius 1: of photons over those joined; 0: nothing is merged
   const EmissionGuide* guide = nullptr;  // which strategies that weigh densities against others' know nothing of
   uint8_t without = 0;  // CausticFlags: what diffuse surfaces do not see of others; whoever stores vertices has to ask too
-  bool weighs = true;   // vertices know what other strategies come to
+  bool weighs = true;  // vertices know what other strategies come to
   bool only_by_mirrors = false;  // ends at the first vertex all of whose light diffuse lobes scattered
 
   // The weight of merging at a vertex over that of joining it.
