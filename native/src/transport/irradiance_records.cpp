@@ -140,14 +140,14 @@ void IrradianceRecords::fill_level(const Work& work, int level) {
 }
 
 // Places that passes came upon and no record holds at: thin things that the overture's one ray for a pixel went past. In so far as it is
-// worth it: as much as refining may cost.
-void IrradianceRecords::fill_gaps(const Work& work, int pass) {
+// worth it: for `most_rays`, of those that refining will cost.
+void IrradianceRecords::fill_gaps(const Work& work, int pass, double most_rays) {
   const RenderContext& context = work.context;
   const FilmSpec& spec = work.film.spec();
   const double pixels = double(spec.region_width()) * double(spec.region_height());
   const bool often = (pass & (pass - 1)) != 0;  // each finds most of what there is
   if (often || context.steady || miss_rate() < kFewMisses) return;
-  if (miss_rate() * pixels * double(s_.samples) * kRaysOfSample > rays_to_refine(context, pass)) return;
+  if (miss_rate() * pixels * double(s_.samples) * kRaysOfSample > most_rays) return;
   const double seconds = context.seconds();
   level_ends_ = seconds + kGapsShare * std::max(context.time_limit - seconds, 0.0);
   for (int level = level_count() - 1; level >= 0 && !context.cancelled; --level) {
@@ -264,18 +264,20 @@ void IrradianceRecords::fill(const Work& work, std::vector<IrradiancePlace> plac
   }
 }
 
-// Rays that refining has still to spend before a pass. Where it is known how many passes there will be, those to come pay in advance: the
-// picture is the mean of what all passes see.
-double IrradianceRecords::rays_to_refine(const RenderContext& context, int pass) const {
-  double passes = pass;
-  const double share = s_.refinement / std::max(1.0 - s_.refinement, 0.01);
-  if (context.passes > 0) passes = std::min<double>(kAhead * pass, context.passes);
+// Rays that refining has still to spend, were there `passes` in all.
+double IrradianceRecords::rays_to_refine(int pass, double passes) const {
+  return s_.refinement / std::max(1.0 - s_.refinement, 0.01) * pass_rays_ / pass * passes - refining_rays_;
+}
+
+// Passes that the picture will have, as far as that is known.
+double IrradianceRecords::passes_to_expect(const RenderContext& context, int pass) const {
+  double passes = context.passes > 0 ? context.passes : kInf;
   if (context.time_limit > 0.0) {
-    const double seconds = context.seconds(), each = (seconds - overture_seconds_) / pass;
-    passes = std::min<double>(
-        passes, std::max<double>(pass, (context.time_limit - overture_seconds_) / std::max(each, 1e-6) * (1.0 - s_.refinement)));
+    const double each = (context.seconds() - overture_seconds_) / pass;
+    const double in_time = (context.time_limit - overture_seconds_) / std::max(each, 1e-6) * (1.0 - s_.refinement);
+    passes = std::min(passes, std::max<double>(pass, in_time));
   }
-  return share * pass_rays_ / pass * passes - refining_rays_;
+  return passes < double(kInf) ? passes : pass;
 }
 
 // More rays for the records, as many in all as the passes are worth: a record's value is the mean of its gathers, and the picture's the
@@ -287,8 +289,9 @@ void IrradianceRecords::refine(const Work& work, int pass) {
     size_t record;
   };
   const uint64_t start = context.scene.rays_traced();
-  const double wanted = rays_to_refine(context, pass);
-  fill_gaps(work, pass);
+  // Passes to come pay in advance: the picture is the mean of what all of them see.
+  const double to_expect = passes_to_expect(context, pass), wanted = rays_to_refine(pass, std::min<double>(kAhead * pass, to_expect));
+  fill_gaps(work, pass, 0.5 * rays_to_refine(pass, to_expect));
   const size_t all = size();
   const auto spent = [&] { return double(context.scene.rays_traced() - start); };
   for (size_t idle = 0; idle < all && spent() < wanted;) {

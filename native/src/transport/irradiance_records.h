@@ -58,11 +58,12 @@ class IrradianceRecords {
   std::optional<Rgb> look_up(const ShadingPoint& point, const Bsdf& bsdf, int level, PixelSample& result) const;
   void play_overture(const Work& work);
   void fill_level(const Work& work, int level);
-  void fill_gaps(const Work& work, int pass);
+  void fill_gaps(const Work& work, int pass, double most_rays);
   void fill_seen(const Work& work, int level, int step, int round);
   void seek(const Work& work, const Camera& eye, int x, int y, int level, int round, std::vector<IrradiancePlace>& places) const;
   void fill(const Work& work, std::vector<IrradiancePlace> places, int level);
-  double rays_to_refine(const RenderContext& context, int pass) const;
+  double passes_to_expect(const RenderContext& context, int pass) const;
+  double rays_to_refine(int pass, double passes) const;
   void refine(const Work& work, int pass);
   GatheredIrradiance gather(const Work& work, const IrradiancePlace& place, int level, uint32_t serial) const;
   bool is_late(const RenderContext& context) const { return context.time_limit > 0.0 && context.seconds() > level_ends_; }
