@@ -2,10 +2,13 @@
 
 import math
 
+import bpy
+
 from .studio import (
     LAMP,
     SKY,
     Case,
+    Unavailable,
     ball,
     camera,
     cube,
@@ -172,8 +175,15 @@ def fog(scene):
     camera((0, -4, 2.5), (0, 0, 0.4), 34.0)
 
 
+def need_tracking():
+    """Cycles marches in steps through volumes that vary up to Blender 4.5, which is biased, and takes minutes of a world."""
+    if bpy.app.version < (5, 0):
+        raise Unavailable("volumes tracked without bias")
+
+
 def cloud_tree(tree):
     """Coloured and thicker where noise says so, glowing low down: by object and generated coordinates."""
+    need_tracking()
     places = node(tree, "ShaderNodeTexCoord")
     noise = node(tree, "ShaderNodeTexNoise", None, {"Vector": places.outputs["Object"], "Scale": 4.0})
     ends = {"From Min": 0.45, "From Max": 0.7, "To Max": 6.0}
@@ -255,6 +265,7 @@ def even_mist(tree):
 
 def low_mist(tree):
     """Thinner with height."""
+    need_tracking()
     place = node(tree, "ShaderNodeNewGeometry").outputs["Position"]
     height = node(tree, "ShaderNodeSeparateXYZ", None, {0: place}).outputs["Z"]
     power = node(tree, "ShaderNodeMath", {"operation": "POWER"}, {0: 0.3, 1: height})
