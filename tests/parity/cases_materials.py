@@ -176,7 +176,7 @@ def fog(scene):
 
 
 def need_tracking():
-    """Cycles marches in steps through volumes that vary up to Blender 4.5, which is biased, and takes minutes of a world."""
+    """Up to Blender 4.5 Cycles marches in steps through volumes that vary: it differs there (that the steps are why is not shown)."""
     if bpy.app.version < (5, 0):
         raise Unavailable("volumes tracked without bias")
 
