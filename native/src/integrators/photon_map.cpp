@@ -294,19 +294,21 @@ class PhotonMapIntegrator final : public Integrator {
     context.log.stage(name + " photons");
     std::optional<EmissionGuide> guide;
     const double began = context.seconds();
+    // False if it was stopped: then nothing has been added. Asked once, for the answer may be another a moment later.
     const auto trace = [&](int batch, int size) {
       if (!guide) guide = learn_emission(context, light, paths, classes, seen);
       light.guide = &*guide;
       const std::vector<Photon> more = trace_photons(context, light, batch, size, classes);
       if (stock.loose.empty()) stock.loose.reserve(size_t(1.02 * kBatches * double(more.size())));  // about as many as there will be
-      if (!context.cancelled) stock.loose.insert(stock.loose.end(), more.begin(), more.end());
+      if (context.cancelled) return false;
+      stock.loose.insert(stock.loose.end(), more.begin(), more.end());
+      return true;
     };
     const bool was_complete = stock.is_complete();
     if (stock.loose.empty() && !was_complete) stock.loose = stock.map.photons();
     const int batch = (paths + kBatches - 1) / kBatches;
     while (stock.batches < kBatches && !(stock.batches > 0 && is_late(context, began))) {
-      trace(stock.batches, batch);
-      if (context.cancelled) return;
+      if (!trace(stock.batches, batch)) return;
       stock.paths = double(++stock.batches) * batch;
     }
     if (!was_complete) stock.settle(context.pool);
@@ -331,8 +333,7 @@ class PhotonMapIntegrator final : public Integrator {
         return;
       }
       stock.loose = stock.map.photons();
-      trace(1, int(stock.paths));
-      if (context.cancelled) return stock.loose.clear();  // those of before are in the map
+      if (!trace(1, int(stock.paths))) return stock.loose.clear();  // those of before are in the map
       stock.paths *= 2.0;
       stock.settle(context.pool);
     }
