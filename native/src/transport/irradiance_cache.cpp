@@ -77,7 +77,14 @@ void IrradianceCache::for_each_at(Vec3 position, const F& f) const {
   do {
     const Node& node = nodes_[index];
     if (is_frozen_) {
-      for (uint32_t i = node.begin; i < node.end; ++i) f(frozen_[i]);
+      for (uint32_t b = node.begin; b < node.end; ++b) {
+        const Block& block = blocks_[b];
+        float beyond[Block::kSize];
+        for (uint32_t i = 0; i < Block::kSize; ++i)
+          beyond[i] = sqr(block.x[i] - position.x) + sqr(block.y[i] - position.y) + sqr(block.z[i] - position.z) - block.reach_squared[i];
+        for (uint32_t i = 0; i < Block::kSize; ++i)
+          if (beyond[i] < 0.0f) f(hot_of(block.record[i]));
+      }
     } else {
       for (uint32_t i = node.first; i != kNone; i = links_[i].next) f(hot_[links_[i].record]);
     }
@@ -208,20 +215,27 @@ void IrradianceCache::refer(uint32_t index, Vec3 low, float side, uint32_t recor
 void IrradianceCache::freeze() {
   // Radii have shrunk since the first records went in: a new tree refers to each from fewer nodes.
   nodes_.assign(1, Node());
-  links_.clear(), frozen_.clear();
+  links_.clear();
   for (uint32_t i = 0; i < records_.size(); ++i) refer(0, low_, side_, i, kOverlap * error_ * records_[i].radius);
-  frozen_.reserve(links_.size());
+  blocks_.clear();
   for (Node& node : nodes_) {
-    node.begin = uint32_t(frozen_.size());
-    for (uint32_t i = node.first; i != kNone; i = links_[i].next) frozen_.push_back(hot_[links_[i].record]);
-    node.end = uint32_t(frozen_.size());
+    node.begin = uint32_t(blocks_.size());
+    uint32_t k = 0;
+    for (uint32_t i = node.first; i != kNone; i = links_[i].next, k = (k + 1) % Block::kSize) {
+      if (k == 0) blocks_.emplace_back();
+      const Hot hot = hot_of(links_[i].record);
+      Block& block = blocks_.back();
+      block.x[k] = hot.position.x, block.y[k] = hot.position.y, block.z[k] = hot.position.z, block.record[k] = hot.record;
+      block.reach_squared[k] = sqr(kOverlap * error_ * std::max(hot.radius, hot.cover));
+    }
+    node.end = uint32_t(blocks_.size());
   }
   is_frozen_ = true;
 }
 
 size_t IrradianceCache::memory_bytes() const {
   return records_.capacity() * sizeof(IrradianceRecord) + nodes_.capacity() * sizeof(Node) + links_.capacity() * sizeof(Link) +
-         (hot_.capacity() + frozen_.capacity()) * sizeof(Hot);
+         hot_.capacity() * sizeof(Hot) + blocks_.capacity() * sizeof(Block);
 }
 
 }  // namespace gi

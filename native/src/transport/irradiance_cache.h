@@ -74,10 +74,17 @@ class IrradianceCache {
   struct Node {
     uint32_t child[8] = {};  // 0: none
     uint32_t first = kNone;       // of the chain of links
-    uint32_t begin = 0, end = 0;  // of its part of `frozen_`
+    uint32_t begin = 0, end = 0;  // of its blocks, once frozen
   };
   struct Link {
     uint32_t record, next;
+  };
+
+  // Some records of a node, so laid out that they are tested at once.
+  struct Block {
+    static constexpr uint32_t kSize = 8;
+    float x[kSize] = {}, y[kSize] = {}, z[kSize] = {}, reach_squared[kSize] = {};  // beyond which a record does not count; 0: none
+    uint32_t record[kSize] = {};
   };
 
   Hot hot_of(uint32_t record) const;
@@ -98,7 +105,8 @@ class IrradianceCache {
   std::vector<IrradianceRecord> records_;
   std::vector<Node> nodes_{1};
   std::vector<Link> links_;
-  std::vector<Hot> hot_, frozen_;
+  std::vector<Hot> hot_;
+  std::vector<Block> blocks_;
   bool is_frozen_ = false;
 };
 

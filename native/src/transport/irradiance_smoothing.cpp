@@ -15,6 +15,9 @@ constexpr float kSameSide = 0.9f;            // cosine between normals
 constexpr float kFlat = 0.15f;               // of the distance: how far from the tangent plane
 constexpr int kBatch = 256;
 
+// Metres within which a record may be evened out with another of which the same holds.
+float reach_of(const IrradianceRecord& r, float overlap) { return std::max(r.reach, overlap * r.radius); }
+
 bool are_of_one_surface(const IrradianceRecord& a, const IrradianceRecord& b, float overlap) {
   const Vec3 d = b.position - a.position;
   const float distance = length(d), seen = std::min(a.reach, b.reach), held = overlap * std::min(a.radius, b.radius);
@@ -29,14 +32,14 @@ IrradianceSmoothing::IrradianceSmoothing(const IrradianceCache& cache, ThreadPoo
   std::vector<Vec3> positions;
   for (const IrradianceRecord& r : records) positions.push_back(r.position);
   const PointTree tree(positions, pool);
+  const float overlap = IrradianceCache::kOverlap * cache.error();
   std::vector<std::vector<uint32_t>> found(records.size());
   pool.for_each(int((records.size() + kBatch - 1) / kBatch), cancelled, [&](int batch) {
     std::vector<PointTree::Found> near;
     for (size_t i = size_t(batch) * kBatch; i < std::min(records.size(), size_t(batch + 1) * kBatch); ++i) {
-      const auto accepts = [&](uint32_t k) {
-        return are_of_one_surface(records[i], records[tree.order()[k]], IrradianceCache::kOverlap * cache.error());
-      };
-      tree.nearest(records[i].position, std::end(kSteps)[-1], kInf, near, accepts);
+      const auto accepts = [&](uint32_t k) { return are_of_one_surface(records[i], records[tree.order()[k]], overlap); };
+      const float farthest = 1.001f * reach_of(records[i], overlap);
+      tree.nearest(records[i].position, std::end(kSteps)[-1], sqr(farthest), near, accepts);
       for (PointTree::Found& f : near) f.point = tree.order()[f.point];
       std::sort(near.begin(), near.end(), [&](const auto& a, const auto& b) {
         if ((a.point == i) != (b.point == i)) return a.point == i;
