@@ -131,11 +131,32 @@ SeenPoints seen_points(const std::vector<PathEnd>& ends, ThreadPool& pool) {
   return SeenPoints(points, pool);
 }
 
+namespace {
+
+// Sends first rays alone, which cost little, until enough of them have met what diffuse surfaces do not scatter light of: a glass that one
+// path of ten thousand meets is found so, and each that is found leads to the next. Sends `most` at most; returns how many.
+int scout(const RenderContext& context, SubpathSettings settings, int most, size_t enough, EmissionLearner& learner) {
+  constexpr int kRounds = 12;
+  settings.limits.total = 0;
+  int sent = 0;
+  for (int round = 0; round < kRounds && learner.size() <= enough && !context.cancelled; ++round, sent += most / kRounds)
+    learner.learn(context, settings, most / kRounds, [](const LightVertices& path, Sampler&) {
+      if (path.count() == 0) return 0.0f;
+      const LightVertex& v = path[path.count() - 1];
+      const bool throws_caustics = (v.bsdf.flags() & (kGlossy | kSpecular)) && !(v.bsdf.flags() & kDiffuse);
+      return throws_caustics ? average(v.power) : 0.0f;
+    });
+  return sent;
+}
+
+}  // namespace
+
 EmissionGuide learn_emission(const RenderContext& context, const SubpathSettings& settings, int photons, uint8_t classes,
                              const std::vector<PathEnd>& ends) {
-  constexpr size_t kEnough = 30000, kFew = 300;  // paths that brought something
+  constexpr size_t kEnough = 30000, kFew = 300, kSome = 30;  // paths that brought something
   constexpr double kTimeShare = 0.05;  // of a time limit
   constexpr float kOnTheWay = 0.05f;  // what light of other classes is worth, which at least comes near what is seen
+  constexpr int kFirstRayShare = 4;  // paths cost about as many times what their first rays do
   constexpr int kMostRounds = 16, kFirstRound = 5000;  // each round is twice the one before, up to an eighth of the photons
   const SeenPoints seen = seen_points(ends, context.pool);
   EmissionLearner learner;
@@ -145,7 +166,14 @@ EmissionGuide learn_emission(const RenderContext& context, const SubpathSettings
   int tried = 0;  // at most half as many as there will be photons, where there is nothing of the wished kind
   const double began = context.seconds();
   for (int round = 0; round < kMostRounds && !context.cancelled; ++round) {
+    if (round == EmissionLearner::kFirstRounds && arrived < kSome && classes == kCausticPhoton) {
+      learner.forget();
+      tried += scout(context, settings, photons / 2, kFew, learner) / kFirstRayShare;
+      shows_way = learner.size() < kSome;
+      learner.forget();  // sent by what was learnt, but weighed by what they bring
+    }
     if (round >= EmissionLearner::kFirstRounds && learner.size() > kEnough && (!shows_way || tried >= photons / 2)) break;
+    if (arrived == 0 && tried >= photons / 2) break;
     if (context.time_limit > 0.0 && context.seconds() - began > kTimeShare * context.time_limit) break;
     const int trials = std::min(photons / 8, kFirstRound << round);
     tried += trials;
