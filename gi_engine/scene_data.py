@@ -33,7 +33,10 @@ class Mesh:
     tri_face: np.ndarray | None  # (T,) int32, needed for FACE attributes and materials where there is tri_corner
     face_material: np.ndarray | None  # (F,) int32 slot of each face; None: all 0
     normals_domain: str  # POINT, CORNER or FACE (flat)
-    normals: np.ndarray | None  # (V or C, 3) float32, object space; None when flat
+    # (V or C, 3) float32, object space; of flat meshes the vertices', where something may be displaced, else None.
+    normals: np.ndarray | None
+    # (F,) uint8, of meshes with normals of corners where something may be displaced: not 0 where flat; needs tri_face.
+    sharp_face: np.ndarray | None = None
     attributes: list[Attribute] = field(default_factory=list)
     active_uv: str = ""  # the UV map that renders by default
     texture_space: tuple = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))  # location, size of Generated coordinates
@@ -135,6 +138,9 @@ class Program:
     volume: int = -1  # index of the program of what fills objects of this material; -1: nothing
     only_volume: bool = False  # the surface is not there
     volume_program: Program | None = None  # until it has its index
+    displacement: int = -1  # index of the program that moves vertices; -1: none
+    bumps_displacement: bool = False  # what it moves is bumped by the displacement as well
+    displacement_program: Program | None = None  # until it has its index
     # What an integrator has to carry: "subsurface", "absorption" (volumes that do no more), "volumes" or "portals".
     needs: list[str] = field(default_factory=list)
     approximated: list[str] = field(default_factory=list)  # what is rendered as something else, one text for each node

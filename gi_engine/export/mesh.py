@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from .. import native
-from ..nodes.attributes import ACTIVE_COLOR, ISLAND, POINTINESS, UNDEFORMED
+from ..nodes.attributes import ACTIVE_COLOR, ISLAND, POINTINESS, UNDEFORMED, VERTEX_NORMAL
 from ..scene_data import Attribute, Mesh
 from .arrays import is_triangulated, read, read_attribute, triangle_corners
 
@@ -38,13 +38,14 @@ def export_mesh(mesh, name: str, wanted: set[str], deformed: bool = False) -> Me
     tri_corner = None if triangulated else triangle_corners(mesh)
     if not triangulated and not len(tri_corner):
         return None
-    domain, normals = read_normals(mesh)
+    domain, normals = read_normals(mesh, wanted)
+    sharp = read_sharp_faces(mesh) if domain == "CORNER" and VERTEX_NORMAL in wanted else None
     material = mesh.attributes.get("material_index")  # absent where all are 0
     if not deformed:
         wanted = wanted - {UNDEFORMED}  # slow to read, and no different from the positions
     active_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
     attributes = list(read_attributes(mesh, wanted, active_uv))
-    by_face = material is not None or any(attribute.domain == "FACE" for attribute in attributes)
+    by_face = material is not None or sharp is not None or any(attribute.domain == "FACE" for attribute in attributes)
     return Mesh(
         name=name,
         positions=read_positions(mesh),
@@ -54,6 +55,7 @@ def export_mesh(mesh, name: str, wanted: set[str], deformed: bool = False) -> Me
         face_material=read(material.data, "value", 1, np.int32) if material else None,
         normals_domain=domain,
         normals=normals,
+        sharp_face=sharp,
         attributes=attributes,
         active_uv=active_uv,
         texture_space=(tuple(mesh.texspace_location), tuple(mesh.texspace_size)),
@@ -68,15 +70,21 @@ def read_positions(mesh) -> np.ndarray:
     return buffer[:count].reshape(-1, 3)
 
 
-def read_normals(mesh) -> tuple[str, np.ndarray | None]:
+def read_normals(mesh, wanted: set[str]) -> tuple[str, np.ndarray | None]:
     # Corner normals hold sharp edges and custom normals; asking for them where they are not needed costs
     # memory that Blender keeps.
     domain = mesh.normals_domain
     if domain == "CORNER":
         return domain, read(mesh.corner_normals, "vector", 3, np.float32)
-    if domain == "POINT":
+    if domain == "POINT" or VERTEX_NORMAL in wanted:
         return domain, read(mesh.vertex_normals, "vector", 3, np.float32)
     return "FACE", None
+
+
+def read_sharp_faces(mesh) -> np.ndarray | None:
+    """(F,) uint8: not 0 where a face is flat; None where none is said to be."""
+    sharp = mesh.attributes.get("sharp_face")
+    return read(sharp.data, "value", 1, bool).view(np.uint8) if sharp and sharp.domain == "FACE" else None
 
 
 def read_attributes(mesh, wanted: set[str], active_uv: str):

@@ -179,6 +179,8 @@ class Walk:
         for system in parent.particle_systems:
             if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
                 self.warnings.add("particle hair is not supported yet; left out", parent.name)
+        if is_diced(parent, self.view_layer.id_data):
+            self.warnings.add("adaptive subdivision is not supported yet; its fixed levels are rendered", parent.name)
         if item.is_shadow_catcher or parent.is_shadow_catcher:
             self.warnings.add("shadow catchers are not supported yet; rendered as an ordinary object", item.name)
         self.note_linking(item)
@@ -199,6 +201,18 @@ class Walk:
 
 def ray_visibility(item) -> int:
     return sum(bit for name, bit in VISIBILITY.items() if getattr(item, name)) & VISIBLE_TO_ALL
+
+
+def is_diced(item, scene) -> bool:
+    """Whether Cycles would subdivide the object by how large it is seen: its last modifier says so, or, up to 4.5, it says so itself and
+    the scene takes what is experimental."""
+    last = item.modifiers[-1] if item.modifiers else None
+    if last is None or last.type != "SUBSURF" or not last.show_render:
+        return False
+    if hasattr(last, "use_adaptive_subdivision"):
+        return last.use_adaptive_subdivision
+    experimental = getattr(getattr(scene, "cycles", None), "feature_set", "") == "EXPERIMENTAL"
+    return experimental and getattr(getattr(item, "cycles", None), "use_adaptive_subdivision", False)
 
 
 def has_shape_keys(item) -> bool:

@@ -34,6 +34,10 @@ class Shaders:
             program.volume = len(self.scene.programs)
             self.scene.programs.append(program.volume_program)
             program.volume_program = None
+        if program.displacement_program is not None:
+            program.displacement = len(self.scene.programs)
+            self.scene.programs.append(program.displacement_program)
+            program.displacement_program = None
         return index
 
     def light(self, light) -> int:

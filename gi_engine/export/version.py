@@ -26,3 +26,13 @@ def straight_floats_are_associated() -> bool:
 def divided_bytes_are_associated() -> bool:
     """From Blender 5.0 on Cycles takes byte colours that Blender has divided by alpha for still multiplied by it."""
     return bpy.app.version >= (5, 0, 0)
+
+
+def undisplaced_steps_differ() -> bool:
+    """Up to Blender 4.5 what bumps a displaced surface steps over it by the size of a pixel on what it was before."""
+    return bpy.app.version < (5, 0, 0)
+
+
+def tangents_are_undisplaced() -> bool:
+    """Up to Blender 4.5 true displacement leaves the tangents of UV maps as they were."""
+    return bpy.app.version < (5, 0, 0)

@@ -8,6 +8,9 @@ from __future__ import annotations
 UNDEFORMED = ".undeformed"  # positions before deformation, for Generated coordinates
 ACTIVE_COLOR = ".active_color"  # the colour attribute that renders
 POINTINESS = ".pointiness"  # how far the surface bulges, by its edges
+VERTEX_NORMAL = (
+    ".vertex_normal"  # what true displacement wants of meshes that are flat, all or in part (Mesh.normals, sharp_face)
+)
 ISLAND = ".island"  # a random number for each part of the mesh that hangs together
 # What each place of an instance knows: coordinates where its instancer made it, and its particle.
 INSTANCER_GENERATED, INSTANCER_UV = "\x02generated", "\x02uv"

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from ..scene_data import Program, Scene
-from .attributes import look_up
+from .attributes import VERTEX_NORMAL, look_up
 from .node_builder import NodeBuilder, by_identifier
 from .program import COLOR, FLOAT, ProgramBuilder, Value
 from .rules import CLOSURE_RULES, RULES
@@ -167,8 +167,11 @@ class Compiler:
             walker.surface(material, walker.tree)
             walker.aovs()
             volume = self.volume(walker, material)
+            displacement = self.displacement(walker, material)
         program = walker.builder.finish(material.name)
         program.volume_program, program.only_volume = volume, volume is not None and not walker.has_surface
+        program.displacement_program = displacement
+        program.bumps_displacement = material.displacement_method == "BOTH"
         program.pass_index = material.pass_index
         settings = getattr(material, "cycles", None)
         program.emission_sampling = getattr(settings, "emission_sampling", "AUTO")
@@ -188,6 +191,20 @@ class Compiler:
         surface.needs |= walker.needs
         surface.approximated |= walker.approximated
         return walker.builder.finish(f"{owner.name}, volume")
+
+    def displacement(self, surface: TreeWalker, material) -> Program | None:
+        """What moves the vertices of the material's objects."""
+        output = surface.tree.get_output_node("CYCLES")
+        if output is None or material.displacement_method == "BUMP":
+            return None
+        walker = TreeWalker(self, surface.who, material)
+        context, socket = Context(walker.tree), walker.tree.get_output_node("CYCLES").inputs["Displacement"]
+        if walker.resolve(context, socket).node is None:
+            return None
+        self.attribute(VERTEX_NORMAL)
+        walker.builder.op("move_point", walker.value(context, socket))
+        surface.approximated |= walker.approximated
+        return walker.builder.finish(f"{material.name}, displacement")
 
     def light(self, light) -> Program:
         """The emission of a lamp's node tree, to be multiplied with the lamp's own."""
@@ -253,12 +270,9 @@ class TreeWalker:
         if output is None:
             self.compiler.warn(f"{self.who} has no Material Output node: it renders black")
             return
-        if self.resolve(context, output.inputs["Displacement"]).node is not None:
-            if material.displacement_method != "BUMP":
-                self.compiler.warn(
-                    f"{self.who}: node '{self.name_of(output)}' moves the surface; its displacement is rendered as bump alone"
-                )
-            NodeBuilder(self, context, output).bump_displacement()
+        method = material.displacement_method
+        if method != "DISPLACEMENT" and self.resolve(context, output.inputs["Displacement"]).node is not None:
+            NodeBuilder(self, context, output).bump_displacement(moved=method == "BOTH")
         self.has_surface = self.resolve(context, output.inputs["Surface"]).node is not None
         volume = output.inputs.get("Volume")
         if not self.has_surface and volume is not None and self.resolve(context, volume).node is not None:
@@ -439,6 +453,16 @@ class TreeWalker:
         with self.builder.isolated():
             yield
         self.outputs = outer
+
+    @contextmanager
+    def undisplaced(self):
+        """Inside, the point is where it was before true displacement."""
+        from ..export.version import undisplaced_steps_differ  # needs bpy
+
+        with self.isolated():
+            before = self.builder.op("undisplace", imm=(undisplaced_steps_differ(),))
+            yield
+            self.builder.op("redisplace", *before)
 
     @contextmanager
     def shifted(self, axis: int, width: Value):

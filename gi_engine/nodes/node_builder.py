@@ -96,14 +96,14 @@ class NodeBuilder:
         for socket in self.node.outputs:
             self.output(socket.identifier, self.walker.default(socket))
 
-    def bump_displacement(self) -> None:
-        """Displacement as a change of the shading normal alone, before the surface is compiled."""
-        with self.walker.isolated():
+    def bump_displacement(self, moved: bool) -> None:
+        """Displacement as a change of the shading normal, before the surface is compiled. `moved`: the surface is displaced, too."""
+        with self.walker.undisplaced() if moved else self.walker.isolated():
             width = self.constant(DISPLACEMENT_FILTER_WIDTH)
             heights = self.shifted_values(
                 lambda: self.op("vector_dot_product", self.input("Displacement"), self.op("normal")), width
             )
-            self.op("set_normal", self.op("bump", *heights, 1.0, 1.0, width, self.op("normal"), imm=(True,)))
+            self.op("set_normal", self.op("bump", *heights, 1.0, 1.0, width, self.op("normal"), imm=(moved,)))
 
 
 def by_identifier(sockets, identifier: str):

@@ -165,4 +165,4 @@ class ProgramBuilder:
 
 
 # Ops that do something besides giving a value: never shared.
-UNIQUE = frozenset({"bump_shift"})
+UNIQUE = frozenset({"bump_shift", "undisplace"})

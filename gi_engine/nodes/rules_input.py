@@ -99,7 +99,9 @@ def tangent(b):
     if b.node.direction_type == "RADIAL":
         b.output("Tangent", radial_tangent(b, b.node.axis))
     else:
-        b.output("Tangent", b.op("tangent_uv", imm=(b.attribute(b.node.uv_map),)))
+        from ..export.version import tangents_are_undisplaced  # needs bpy
+
+        b.output("Tangent", b.op("tangent_uv", imm=(b.attribute(b.node.uv_map), tangents_are_undisplaced())))
 
 
 @rule("ShaderNodeWireframe")

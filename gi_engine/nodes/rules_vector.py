@@ -81,12 +81,13 @@ def normal(b):
 
 @rule("ShaderNodeNormalMap")
 def normal_map(b):
-    from ..export.version import normal_maps_take_short_normals  # needs bpy
+    from ..export.version import normal_maps_take_short_normals, tangents_are_undisplaced  # needs bpy
 
     color, strength, space = b.input("Color"), b.input("Strength"), b.node.space
     green = getattr(b.node, "convention", "OPENGL") == "DIRECTX"
     if space == "TANGENT":
-        imm = (b.attribute(b.node.uv_map), green, not normal_maps_take_short_normals())
+        original = 1 if getattr(b.node, "base", "") == "ORIGINAL" else 2 * tangents_are_undisplaced()
+        imm = (b.attribute(b.node.uv_map), green, not normal_maps_take_short_normals(), original)
         result = b.op("normal_map_tangent", color, strength, imm=imm)
     else:
         result = b.op(

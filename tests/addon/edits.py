@@ -208,6 +208,17 @@ def unlink(rng):
         tree.links.remove(rng.choice(list(tree.links)))
 
 
+def displace(rng):
+    """Vertices moved by a material, farther, otherwise or no more."""
+    material, tree = a_material(rng)
+    node = node_of(tree, "ShaderNodeDisplacement")
+    node.inputs["Scale"].default_value = rng.uniform(-0.5, 0.5)
+    material.displacement_method = rng.choice(("BUMP", "DISPLACEMENT", "BOTH"))
+    output = node_of(tree, "ShaderNodeOutputMaterial")
+    if not output.inputs["Displacement"].is_linked:
+        tree.links.new(node.outputs[0], output.inputs["Displacement"])
+
+
 def group(rng):
     """A node group, or another value in it."""
     if not bpy.data.node_groups:
@@ -358,7 +369,7 @@ def look(rng):
 EDITS = [
     *(move, turn, flatten, bend, add_object, remove_object, hide, rename, set_visibility, color, parent, modify),
     *(shape_key, switch_mode, duplicate, collect, hide_collection, instance_collection, remove_collection),
-    *(paint, assign, link_texture, unlink, group, paint_image, set_image, color_attribute),
+    *(paint, assign, link_texture, unlink, displace, group, paint_image, set_image, color_attribute),
     *(lamp, add_lamp, remove_lamp, set_lamp, lamp_nodes, world, sky, no_world),
     *(frame, animate_material, settings, view_layer, look, undo, undo, other_scene),
 ]

@@ -402,3 +402,17 @@ def render_cycles(scene) -> np.ndarray:
         pixels = np.empty(len(image.pixels), np.float32)
         image.pixels.foreach_get(pixels)
         return pixels.reshape(image.size[1], image.size[0], 4)
+
+
+@pytest.mark.parametrize("diced", [False, True])
+def test_adaptive_subdivision_is_named_and_its_fixed_levels_rendered(scene, render_export, diced):
+    item = add(scene, "Board", mesh())
+    modifier = item.modifiers.new("Subdivision", "SUBSURF")
+    modifier.render_levels = 2
+    owner = modifier
+    if not hasattr(modifier, "use_adaptive_subdivision"):
+        scene.cycles.feature_set, owner = "EXPERIMENTAL", item.cycles
+    owner.use_adaptive_subdivision = diced
+    exported = render_export()
+    assert any("adaptive subdivision" in text and "Board" in text for text in exported.warnings) == diced
+    assert exported.scene.meshes[0].triangle_count == 16 * 2

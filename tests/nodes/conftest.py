@@ -74,6 +74,18 @@ class Stage:
     def link(self, output, socket):
         return self.tree.links.new(output, socket)
 
+    def waves(self, scale=9.0):
+        """A smooth height that varies over the surface."""
+        apart, product = self.new("ShaderNodeSeparateXYZ"), self.new("ShaderNodeMath", operation="MULTIPLY")
+        self.link(self.new("ShaderNodeTexCoord").outputs["Object"], apart.inputs[0])
+        for i in range(2):
+            times, sine = self.new("ShaderNodeMath", operation="MULTIPLY"), self.new("ShaderNodeMath", operation="SINE")
+            times.inputs[1].default_value = scale
+            self.link(apart.outputs[i], times.inputs[0])
+            self.link(times.outputs[0], sine.inputs[0])
+            self.link(sine.outputs[0], product.inputs[i])
+        return product.outputs[0]
+
     def show(self, output) -> None:
         self.link(output, self.emission.inputs["Color"])
 

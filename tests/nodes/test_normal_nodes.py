@@ -7,26 +7,12 @@ import pytest
 from mathutils import Matrix
 
 
-def waves(stage, scale=9.0):
-    """A smooth height that varies over the surface."""
-    coordinates, apart = stage.new("ShaderNodeTexCoord"), stage.new("ShaderNodeSeparateXYZ")
-    stage.link(coordinates.outputs["Object"], apart.inputs[0])
-    product = stage.new("ShaderNodeMath", operation="MULTIPLY")
-    for i in range(2):
-        times, sine = stage.new("ShaderNodeMath", operation="MULTIPLY"), stage.new("ShaderNodeMath", operation="SINE")
-        times.inputs[1].default_value = scale
-        stage.link(apart.outputs[i], times.inputs[0])
-        stage.link(times.outputs[0], sine.inputs[0])
-        stage.link(sine.outputs[0], product.inputs[i])
-    return product.outputs[0]
-
-
 @pytest.mark.parametrize("invert", [False, True])
 @pytest.mark.parametrize("strength", [1.0, 0.4])
 def test_bump(stage, invert, strength):
     node = stage.new("ShaderNodeBump", invert=invert)
     node.inputs["Strength"].default_value, node.inputs["Distance"].default_value = strength, 0.05
-    stage.link(waves(stage), node.inputs["Height"])
+    stage.link(stage.waves(), node.inputs["Height"])
     stage.show(node.outputs[0])
     # One-sided differences over steps of the surface that the engines take in different directions.
     stage.check(tolerance=2e-2)
@@ -40,7 +26,7 @@ def test_bump_of_attribute_and_bump(stage):
     apart = stage.new("ShaderNodeSeparateXYZ")
     stage.link(stage.new("ShaderNodeUVMap", uv_map="Second").outputs[0], apart.inputs[0])
     stage.link(apart.outputs["Y"], first.inputs["Height"])
-    stage.link(waves(stage, 4.0), second.inputs["Height"])
+    stage.link(stage.waves(4.0), second.inputs["Height"])
     stage.link(first.outputs[0], second.inputs["Normal"])
     stage.show(second.outputs[0])
     stage.check(tolerance=2e-2)
@@ -55,7 +41,7 @@ def test_bump_without_height(stage):
 def test_displacement_as_bump(stage, space):
     node = stage.new("ShaderNodeDisplacement", space=space)
     node.inputs["Scale"].default_value = 0.05
-    stage.link(waves(stage, 4.0), node.inputs["Height"])
+    stage.link(stage.waves(4.0), node.inputs["Height"])
     output = next(n for n in stage.tree.nodes if n.type == "OUTPUT_MATERIAL")
     stage.link(node.outputs[0], output.inputs["Displacement"])
     stage.material.displacement_method = "BUMP"

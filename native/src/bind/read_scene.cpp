@@ -105,7 +105,8 @@ struct Record {
  private:
   template <class T>
   static std::string type_name() {
-    return std::is_same_v<std::remove_const_t<T>, float> ? "float32" : "int32";
+    using Number = std::remove_const_t<T>;
+    return std::is_same_v<Number, float> ? "float32" : std::is_same_v<Number, uint8_t> ? "uint8" : "int32";
   }
 };
 
@@ -136,6 +137,7 @@ MeshData read_mesh(const Record& r) {
   m.face_material = r.array<const int32_t>("face_material");
   m.normals_domain = read_domain(r, "normals_domain");
   m.normals = r.array<const float>("normals");
+  m.sharp_face = r.array<const uint8_t>("sharp_face");
   for (const Record& a : r.list("attributes", r.who + " attribute")) {
     AttributeData d;
     d.name = a.get<std::string>("name");
@@ -231,6 +233,8 @@ MaterialData read_program(const Record& r) {
   m.bump_correction = r.get<bool>("bump_correction");
   m.volume = r.get<int>("volume");
   m.only_volume = r.get<bool>("only_volume");
+  m.displacement = r.get<int>("displacement");
+  m.bumps_displacement = r.get<bool>("bumps_displacement");
   return m;
 }
 
@@ -244,8 +248,10 @@ SceneData read_scene(nb::handle scene, const KnownMeshes& known) {
     if (found == known.index.end() || known.data->meshes[size_t(found->second)].is_moved) {
       d.meshes.push_back(read_mesh(m));
     } else {
-      d.meshes.push_back(known.data->meshes[size_t(found->second)]);
-      d.meshes.back().before = found->second;
+      MeshData& mesh = d.meshes.emplace_back(known.data->meshes[size_t(found->second)]);
+      mesh.before = found->second;
+      if (mesh.undisplaced) mesh.positions = mesh.undisplaced->positions, mesh.normals = mesh.undisplaced->normals;
+      mesh.undisplaced.reset();
     }
   }
   for (const Record& i : r.list("instances", "object")) read_instances(i, d.instances);

@@ -26,7 +26,11 @@ inline Vec3 generated_coordinates(const ShadeState& s, int slot) {
   if (!i) return s.point.object_position;
   const MeshData& mesh = s.resources.scene->mesh(i->mesh);
   float a[4];
-  const Vec3 p = s.resources.scene->attribute(s.point, slot, a) == 3 ? Vec3{a[0], a[1], a[2]} : s.point.object_position;
+  Vec3 p = s.point.object_position;
+  if (s.resources.scene->attribute(s.point, slot, a) == 3)
+    p = {a[0], a[1], a[2]};
+  else if (const auto before = s.resources.scene->undisplaced(s.point))
+    p = i->to_object.point(before->position);
   const Vec3 d = p - mesh.texture_location, size = mesh.texture_size;
   return Vec3{safe_divide(d.x, size.x), safe_divide(d.y, size.y), safe_divide(d.z, size.z)} * 0.5f + Vec3{0.5f, 0.5f, 0.5f};
 }

@@ -49,7 +49,8 @@ float first_step(const ShadingPoint& p) {
   return kStep * std::max({std::abs(p.position.x), std::abs(p.position.y), std::abs(p.position.z), 0.05f});
 }
 
-const Scene* scene_of(const ShadeState& s) { return instance_of(s) ? s.resources.scene : nullptr; }
+// Null where there is nothing to trace: on the world, and while surfaces are displaced.
+const Scene* scene_of(const ShadeState& s) { return instance_of(s) && s.resources.scene->traceable() ? s.resources.scene : nullptr; }
 
 // ---------------------------------------------------------------- ambient occlusion
 

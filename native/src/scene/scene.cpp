@@ -29,15 +29,23 @@ bool keeps_angles(const Affine& a) {
          std::abs(dot(z, x)) < small;
 }
 
+// As in Cycles, which shades flat faces among smooth ones by the normals of their corners until they are displaced.
+bool shades_flat(const MeshData& mesh, size_t triangle) {
+  return mesh.normals_domain == Domain::kFace || (mesh.undisplaced && mesh.is_flat(triangle));
+}
+
 }  // namespace
 
 Scene::Scene(SceneData data, std::unique_ptr<ShaderResources> resources, const std::string& embree, int threads, const Editing& editing)
     : data_(std::move(data)), resources_(std::move(resources)) {
   resources_->scene = this;
+  part_what_moves_differently(data_);
   index_vertices(editing.before);
   resolve_attributes();
-  make_tangents(editing.before);  // in object space, so before meshes are placed
-  place_meshes(editing);
+  make_tangents(editing.before);
+  place_instances();
+  displace(editing.before, threads);
+  place_meshes(editing);  // all else is in object space
   build_accel(embree, threads, editing.before);
 }
 
@@ -62,8 +70,7 @@ void Scene::index_vertices(const Scene* before) {
   }
 }
 
-void Scene::place_meshes(const Editing& editing) {
-  mesh_bounds_.resize(data_.meshes.size());
+void Scene::place_instances() {
   std::vector<uint32_t> uses(data_.meshes.size(), 0);
   for (const InstanceData& i : data_.instances) ++uses[i.mesh];
   for (const InstanceData& i : data_.instances) {
@@ -72,12 +79,22 @@ void Scene::place_meshes(const Editing& editing) {
     placed.to_world = i.matrix;
     placed.to_object = i.matrix.inverse();
     placed.mirrored = i.matrix.determinant() < 0.0f;
-    // As an instance, what is flat by its matrix could not be traced.
-    placed.world_space = uses[i.mesh] == 1 && (!editing.movable || i.matrix.inverse().determinant() == 0.0f);
-    // So does Cycles, which moves a mesh that one object alone uses, normals and all.
-    placed.world_normals = uses[i.mesh] == 1 && !keeps_angles(i.matrix);
+    placed.is_only = uses[i.mesh] == 1;
     placed.data = &i;
+    instances_.push_back(placed);
+  }
+}
+
+// To world space, where they need not stay in their own.
+void Scene::place_meshes(const Editing& editing) {
+  mesh_bounds_.resize(data_.meshes.size());
+  for (Instance& placed : instances_) {
+    const InstanceData& i = *placed.data;
     MeshData& mesh = data_.meshes[i.mesh];
+    // As an instance, what is flat by its matrix could not be traced.
+    placed.world_space = placed.is_only && (!editing.movable || i.matrix.inverse().determinant() == 0.0f);
+    // So does Cycles, which moves a mesh that one object alone uses, normals and all, if it is not displaced.
+    placed.world_normals = placed.is_only && !mesh.undisplaced && !keeps_angles(i.matrix);
     if (placed.world_space && !i.matrix.is_identity()) {
       // The caller's array stays as it is; the moved one takes its place (and its memory, once the caller lets go).
       auto moved = std::make_shared<std::vector<float>>(mesh.positions.size + 1);
@@ -95,7 +112,6 @@ void Scene::place_meshes(const Editing& editing) {
       const Vec3 p{corner & 1 ? local.hi.x : local.lo.x, corner & 2 ? local.hi.y : local.lo.y, corner & 4 ? local.hi.z : local.lo.z};
       bounds_.add(placed.world_space ? p : placed.to_world.point(p));
     }
-    instances_.push_back(placed);
   }
 }
 
@@ -112,12 +128,15 @@ void Scene::resolve_attributes() {
   }
 }
 
-// What the scene before had of the same mesh and map.
+// What the scene before had of the same mesh and map, undisplaced.
 Scene::Tangents Scene::known_tangents(const MeshData& mesh, int slot, const Scene* before) const {
-  if (mesh.before < 0 || before->tangents_[size_t(mesh.before)].empty()) return nullptr;
+  if (mesh.before < 0) return nullptr;
+  const size_t m = size_t(mesh.before);
+  const std::vector<Tangents>& known = before->moved_by_[m] >= 0 ? before->undisplaced_tangents_[m] : before->tangents_[m];
+  if (known.empty()) return nullptr;
   const std::vector<std::string>& names = before->data_.attribute_names;
   const auto found = std::find(names.begin(), names.end(), data_.attribute_names[size_t(slot)]);
-  return found == names.end() ? nullptr : before->tangents_[size_t(mesh.before)][size_t(found - names.begin())];
+  return found == names.end() ? nullptr : known[size_t(found - names.begin())];
 }
 
 void Scene::make_tangents(const Scene* before) {
@@ -125,9 +144,12 @@ void Scene::make_tangents(const Scene* before) {
   static constexpr std::pair<std::string_view, int> kUsers[] = {{"normal_map_tangent", 0}, {"tangent_uv", 0}, {"vector_displacement", 0}};
   tangents_.resize(data_.meshes.size());
   for (const InstanceData& i : data_.instances) {
-    for (const int32_t material : i.materials) {
+    std::vector<int32_t> programs = i.materials;
+    for (const int32_t m : i.materials)
+      if (data_.materials[size_t(m)].displacement >= 0) programs.push_back(data_.materials[size_t(m)].displacement);
+    for (const int32_t program : programs) {
       for (const auto& [op, immediate] : kUsers) {
-        for (const int32_t slot : data_.materials[size_t(material)].program.immediates(op, immediate)) {
+        for (const int32_t slot : data_.materials[size_t(program)].program.immediates(op, immediate)) {
           tangents_[i.mesh].resize(data_.attribute_names.size());
           Tangents& made = tangents_[i.mesh][size_t(slot)];
           if (!made) made = known_tangents(data_.meshes[i.mesh], slot, before);
@@ -156,8 +178,7 @@ std::vector<CornerTangent> Scene::tangents_of(uint32_t m, int slot) const {
   }
   for (size_t c = 0; c < corners.size(); c += 3) {
     const Vec3 a = corners[c].position, flat = normalize(cross(corners[c + 1].position - a, corners[c + 2].position - a));
-    for (size_t k = 0; k < 3; ++k)
-      corners[c + k].normal = mesh.normals_domain == Domain::kFace ? flat : corner_normal(m, uint32_t(c / 3), int(k));
+    for (size_t k = 0; k < 3; ++k) corners[c + k].normal = shades_flat(mesh, c / 3) ? flat : corner_normal(m, uint32_t(c / 3), int(k));
   }
   return corner_tangents(corners);
 }
@@ -192,6 +213,7 @@ size_t Scene::memory_bytes() const {
   for (const MeshData& m : data_.meshes) {
     bytes += (m.positions.size + m.corner_vert.size + 2 * m.tri_corner.size + m.tri_face.size + m.face_material.size + m.normals.size) * 4;
     for (const AttributeData& a : m.attributes) bytes += a.data.size * 4;
+    if (m.undisplaced) bytes += (m.undisplaced->positions.size + m.undisplaced->normals.size) * 4;
   }
   for (const auto& slots : tangents_)
     for (const Tangents& corners : slots) bytes += corners ? corners->size() * sizeof(CornerTangent) : 0;
@@ -249,7 +271,7 @@ ShadingPoint Scene::surface_point(uint32_t instance, uint32_t triangle, float b1
   const Vec3 n = cross(e1, e2);
   p.ng = normalize_or(placed.mirrored ? -n : n, wo);
   p.ns = p.ng;
-  if (mesh.normals_domain != Domain::kFace) {
+  if (!shades_flat(mesh, triangle)) {
     const float w[3] = {1.0f - b1 - b2, b1, b2};
     Vec3 sum;
     const auto to_world = [&](Vec3 v) { return placed.to_object.transposed_vector(v); };
@@ -274,7 +296,7 @@ Vec3 Scene::shadow_origin(const ShadingPoint& point, Vec3 wi) const {
   const Instance& placed = instances_[point.instance];
   const MeshData& mesh = data_.meshes[placed.mesh];
   const float cutoff = placed.data->shadow_terminator_geometry_offset;
-  if (!(cutoff > 0.0f) || mesh.normals_domain == Domain::kFace) return point.position;
+  if (!(cutoff > 0.0f) || shades_flat(mesh, point.triangle)) return point.position;
   // How near the terminator is: by both normals where light grazes the shading one, fading out towards the cutoff.
   const float side = dot(point.ns, wi) < 0.0f ? -1.0f : 1.0f;
   const float cos_shading = side * dot(point.ns, wi), cos_geometric = side * dot(point.ng, wi);
@@ -440,16 +462,17 @@ Vec3 Scene::smooth_object_normal(const ShadingPoint& point) const {
   const Instance& placed = instances_[point.instance];
   const MeshData& mesh = data_.meshes[placed.mesh];
   const Vec3 flat = normalize(placed.to_world.transposed_vector(point.backfacing ? -point.ng : point.ng));
-  if (mesh.normals_domain == Domain::kFace) return flat;
+  if (shades_flat(mesh, point.triangle)) return flat;
   const float w[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};
   Vec3 sum;
   for (int k = 0; k < 3; ++k) sum += w[k] * corner_normal(placed.mesh, point.triangle, k);
   return sum == Vec3{} ? flat : sum;
 }
 
-std::optional<CornerTangent> Scene::uv_tangent(const ShadingPoint& point, int slot) const {
+std::optional<CornerTangent> Scene::uv_tangent(const ShadingPoint& point, int slot, bool undisplaced) const {
   if (point.instance == kNoId) return {};
-  const std::vector<Tangents>& slots = tangents_[point.mesh];
+  const bool was_moved = undisplaced && moved_by_[point.mesh] >= 0;
+  const std::vector<Tangents>& slots = (was_moved ? undisplaced_tangents_ : tangents_)[point.mesh];
   if (slots.empty() || !slots[size_t(slot)] || slots[size_t(slot)]->empty()) return {};
   const CornerTangent* corner = slots[size_t(slot)]->data() + 3 * size_t(point.triangle);
   const float w[3] = {1.0f - point.b1 - point.b2, point.b1, point.b2};

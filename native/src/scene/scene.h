@@ -15,11 +15,21 @@
 
 namespace gi {
 
+// Where a point was before true displacement, world space: the edges of its triangle, its normal, turned as the point's own, and that
+// normal in object space, interpolated but not made unit nor turned to the viewer.
+struct Undisplaced {
+  Vec3 position, normal, e1, e2, object_normal;
+};
+
+// Gives instances of one mesh that displacement moves differently a mesh each.
+void part_what_moves_differently(SceneData& data);
+
 // One placed mesh, ready for shading.
 struct Instance {
   uint32_t mesh = 0;
   Affine to_world, to_object;
   bool mirrored = false;     // negative determinant
+  bool is_only = false;      // the mesh's only one
   bool world_space = false;  // the mesh's positions are already in world space
   bool world_normals = false;  // corner normals are made unit in world space before they are interpolated, not in object space
   const InstanceData* data = nullptr;
@@ -99,7 +109,12 @@ class Scene {
   Vec3 smooth_object_normal(const ShadingPoint& point) const;
   // The tangent of the UV map in slot `slot`, interpolated but not made unit, object space. For the slots that ops of the
   // object's materials take tangents of; null if the object has no such map.
-  std::optional<CornerTangent> uv_tangent(const ShadingPoint& point, int slot) const;
+  std::optional<CornerTangent> uv_tangent(const ShadingPoint& point, int slot, bool undisplaced = false) const;
+
+  // Null where there is no true displacement.
+  std::optional<Undisplaced> undisplaced(const ShadingPoint& point) const;
+  // Whether rays can be traced already: not while the surface is being displaced.
+  bool traceable() const { return accel_ != nullptr; }
 
   std::string embree_description() const { return accel_->description(); }
   size_t memory_bytes() const;  // geometry and acceleration structure
@@ -116,7 +131,16 @@ class Scene {
   using Tangents = std::shared_ptr<const std::vector<CornerTangent>>;  // of each corner of a mesh's triangles
 
   void index_vertices(const Scene* before);
+  void place_instances();
   void place_meshes(const Editing& editing);
+  void displace(const Scene* before, int threads);
+  bool is_displaced_as(uint32_t mesh, const Scene& before) const;
+  void displace_mesh(uint32_t instance, int threads);
+  void retie_tangents(uint32_t mesh, const std::vector<Tangents>* known);
+  int displacement_of(uint32_t instance, uint32_t triangle) const;  // the program, or -1
+  Vec3 displacement_normal(uint32_t mesh, uint32_t triangle, int k) const;
+  Vec3 displacement_at(uint32_t instance, uint32_t triangle, int k, Vec3 normal) const;
+  void renew_normals(uint32_t instance, const std::vector<Vec3>& from, const std::vector<Vec3>& to);
   void resolve_attributes();
   void make_tangents(const Scene* before);
   Tangents known_tangents(const MeshData& mesh, int slot, const Scene* before) const;
@@ -130,6 +154,8 @@ class Scene {
   std::vector<Instance> instances_;
   std::vector<std::vector<int32_t>> attribute_index_;  // per mesh and slot: which of its attributes, or -1
   std::vector<std::vector<Tangents>> tangents_;        // per mesh and slot; none where no op takes them
+  std::vector<std::vector<Tangents>> undisplaced_tangents_;  // the same before displacement, where there is one
+  std::vector<int32_t> moved_by_;                      // per mesh: the instance whose materials displace it, or -1
   std::vector<int32_t> active_uv_;                     // per mesh: which attribute, or -1
   std::vector<Array<const uint32_t>> indices_;         // per mesh: Embree's index buffer
   std::vector<Bounds> mesh_bounds_;                    // per mesh, of its positions as they are

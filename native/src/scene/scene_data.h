@@ -1,6 +1,7 @@
 // The scene as it arrives from export: the native twin of gi_engine/scene_data.py. Arrays are shared with NumPy.
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,23 +29,34 @@ struct AttributeData {
   Array<const float> data;
 };
 
+// What true displacement changes of a mesh.
+struct MeshShape {
+  Array<float> positions;
+  Array<const float> normals;
+};
+
 struct MeshData {
   std::string name;
   Array<float> positions;  // 3 per vertex; taken over: moved to world space where one instance alone uses the mesh
   Array<const int32_t> corner_vert, tri_corner, tri_face, face_material;
   bool triangulated = false;  // all faces are triangles: no tri_corner, no tri_face
   Domain normals_domain = Domain::kFace;
-  Array<const float> normals;
+  Array<const float> normals;  // of faces: the vertices', for displacement, or none
+  Array<const uint8_t> sharp_face;  // of meshes with normals of corners: not 0 where flat; or none
   std::vector<AttributeData> attributes;
   std::string active_uv;
   Vec3 texture_location, texture_size{1, 1, 1};
   int32_t before = -1;  // which mesh of the scene before this one it is (Editing), checked there; -1: none
   bool is_moved = false;  // by Scene, to world space
+  std::optional<MeshShape> undisplaced;  // object space; where true displacement has moved the mesh
   std::vector<std::string> warnings;
   size_t triangle_count() const { return (triangulated ? corner_vert.size : tri_corner.size) / 3; }
   size_t corner(size_t k) const { return triangulated ? k : size_t(tri_corner[k]); }  // 3 per triangle
   bool has_faces() const { return triangulated || !tri_face.empty(); }
   size_t face(size_t triangle) const { return triangulated ? triangle : size_t(tri_face[triangle]); }
+  bool is_flat(size_t triangle) const {
+    return normals_domain == Domain::kFace || (!sharp_face.empty() && sharp_face[face(triangle)] != 0);
+  }
   size_t vertex_count() const { return positions.size / 3; }
 };
 
@@ -104,6 +116,8 @@ struct MaterialData {
   bool transparent_shadows = true, bump_correction = true;
   int volume = -1;           // program of what fills objects of this material; -1: nothing
   bool only_volume = false;  // its surface is not there
+  int displacement = -1;            // program that moves its vertices; -1: none
+  bool bumps_displacement = false;  // its surface is bumped by the displacement as well
 };
 
 struct SceneData {

@@ -62,8 +62,10 @@ void validate_mesh(MeshData& mesh) {
   }
   require(mesh.face_material.empty() || mesh.face_material.size == faces, who + "tri_face is out of the range of face_material");
   require(mesh.face_material.empty() || mesh.has_faces() || mesh.triangle_count() == 0, who + "face_material needs tri_face");
-  if (mesh.normals_domain != Domain::kFace) {
-    const size_t want = 3 * elements(mesh, mesh.normals_domain, faces);
+  require(mesh.sharp_face.empty() || (mesh.sharp_face.size >= faces && mesh.has_faces()) || mesh.triangle_count() == 0,
+          who + "sharp_face needs tri_face and one entry for each face");
+  if (mesh.normals_domain != Domain::kFace || !mesh.normals.empty()) {
+    const size_t want = 3 * elements(mesh, mesh.normals_domain == Domain::kCorner ? Domain::kCorner : Domain::kPoint, faces);
     require(mesh.normals.size == want,
             who + "normals has " + std::to_string(mesh.normals.size) + " values instead of " + std::to_string(want));
   }
@@ -116,7 +118,10 @@ void validate(SceneData& data, std::vector<std::string>& warnings) {
     }
     return false;
   });
-  for (const MaterialData& m : data.materials) check_program(data, m.volume, "the volume of '" + m.program.name() + "'", -1);
+  for (const MaterialData& m : data.materials) {
+    check_program(data, m.volume, "the volume of '" + m.program.name() + "'", -1);
+    check_program(data, m.displacement, "the displacement of '" + m.program.name() + "'", -1);
+  }
   std::erase_if(data.lamps, [&](const LampData& lamp) {
     check_program(data, lamp.program, "light '" + lamp.name + "'", -1);
     if (is_finite(lamp.matrix) && is_finite(lamp.color)) return false;

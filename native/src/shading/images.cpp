@@ -156,6 +156,16 @@ Texel ImageSet::lookup(int index, Vec2 uv, Interpolation interpolation, Extensio
   return {Rgb(c.v[0], c.v[1], c.v[2]), alpha};
 }
 
+bool ImageSet::same_as(const ImageSet& other) const {
+  const auto same_tile = [](const ImageTile& a, const ImageTile& b) {
+    return a.bytes == b.bytes && a.floats == b.floats && a.srgb == b.srgb && a.alpha == b.alpha && a.number == b.number;
+  };
+  const auto same = [&](const Image& a, const Image& b) {
+    return a.tiled == b.tiled && std::equal(a.tiles.begin(), a.tiles.end(), b.tiles.begin(), b.tiles.end(), same_tile);
+  };
+  return std::equal(images_.begin(), images_.end(), other.images_.begin(), other.images_.end(), same);
+}
+
 size_t ImageSet::memory_bytes() const {
   size_t n = 0;
   for (const Image& image : images_)

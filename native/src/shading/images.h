@@ -52,6 +52,8 @@ class ImageSet {
   // a straight image's colour is divided by the interpolated alpha again.
   Texel lookup(int image, Vec2 uv, Interpolation interpolation, Extension extension, bool unassociate) const;
 
+  // Whether both hold the very same pixels.
+  bool same_as(const ImageSet& other) const;
   size_t size() const { return images_.size(); }
   const Image& operator[](size_t i) const { return images_[i]; }
   size_t memory_bytes() const;

@@ -123,6 +123,8 @@ class Program {
   // Of a volume's: whether it neither scatters nor glows, whatever values it works with.
   bool only_absorbs() const;
   bool empty() const { return code_.empty(); }
+  // Whether it does the same, step by step.
+  bool same_as(const Program& other) const { return code_ == other.code_ && constants_ == other.constants_ && tables_ == other.tables_; }
   // Immediate `index` of every call of op `name`: what the program will ask of its surroundings.
   std::vector<int32_t> immediates(std::string_view name, int index) const;
   // What it emits where that does not depend on the point: no context op decides it.

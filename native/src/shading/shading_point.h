@@ -39,7 +39,9 @@ struct ShadingPoint {
   Vec3 object_position;  // in the instance's own space
   uint32_t instance = kNoId, mesh = kNoId, triangle = kNoId;  // kNoId on the world and on lamps
   float b1 = 0, b2 = 0;  // barycentrics of the triangle's 2nd and 3rd corner
+  float shift1 = 0, shift2 = 0;  // how far bumps have moved the barycentrics
   float footprint = 0;    // radius of the pixel on the surface, metres: what Bump steps by; 0 where the path has none
+  float undisplaced_step = 0;  // seen where it was before true displacement, with steps that much as long; 0: seen where it is
   PathState path;
   const Affine* lamp_to_world = nullptr;  // on lamps
   const float* instance_info = nullptr;  // see scene/scene.h InstanceInfo

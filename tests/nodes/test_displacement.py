@@ -1,0 +1,210 @@
+"""True displacement, against Cycles pixel by pixel: where the surface is, how it is shaded, and what textures see on it."""
+
+import bpy
+import numpy as np
+import pytest
+
+from_5 = pytest.mark.skipif(
+    bpy.app.version < (5, 0, 0), reason="Cycles 4.5 bumps what is displaced already, or tears edges open"
+)
+BOTH_FROM_5 = ["DISPLACEMENT", pytest.param("BOTH", marks=from_5)]
+
+
+def displace(stage, method, idname="ShaderNodeDisplacement", material=None, scale=0.25, **settings):
+    node = stage.new(idname, **settings)
+    node.inputs["Scale"].default_value, node.inputs["Midlevel"].default_value = scale, 0.2
+    if idname == "ShaderNodeDisplacement":
+        stage.link(stage.waves(4.0), node.inputs["Height"])
+    else:
+        whole = stage.new("ShaderNodeCombineXYZ")
+        for i, frequency in enumerate((3.0, 4.0, 5.0)):
+            stage.link(stage.waves(frequency), whole.inputs[i])
+        stage.link(whole.outputs[0], node.inputs["Vector"])
+    output = next(n for n in stage.tree.nodes if n.type == "OUTPUT_MATERIAL")
+    stage.link(node.outputs[0], output.inputs["Displacement"])
+    stage.material.displacement_method = method
+
+
+SHOWN = {
+    "position": ("ShaderNodeNewGeometry", "Position"),
+    "normal": ("ShaderNodeNewGeometry", "Normal"),
+    "true normal": ("ShaderNodeNewGeometry", "True Normal"),
+    "object": ("ShaderNodeTexCoord", "Object"),
+    "generated": ("ShaderNodeTexCoord", "Generated"),
+    "tangent": ("ShaderNodeTangent", "Tangent"),
+}
+
+
+def show(stage, what):
+    idname, output = SHOWN[what]
+    node = stage.new(idname)
+    if what == "tangent":
+        node.direction_type = "UV_MAP"
+    stage.show(node.outputs[output])
+
+
+def harden(stage):
+    """Some faces flat, some edges sharp: the mesh has normals of corners."""
+    mesh = stage.object.data
+    mesh.polygons.foreach_set("use_smooth", [k % 5 != 0 for k in range(len(mesh.polygons))])
+    sharp = mesh.attributes.new("sharp_edge", "BOOLEAN", "EDGE")
+    sharp.data.foreach_set("value", [k % 4 == 0 for k in range(len(mesh.edges))])
+    assert mesh.normals_domain == "CORNER"
+
+
+def see_from_below(stage):
+    stage.scene.camera.location = (0.3, -2.0, -2.2)
+    stage.scene.camera.rotation_euler = (2.3, 0.05, 0.1)
+
+
+def tolerance_of(method, what):
+    # Bumps are differences over steps of the surface that the engines take in different directions.
+    return 2e-2 if method != "DISPLACEMENT" and what in {"normal", "tangent"} else 1e-3
+
+
+@pytest.mark.parametrize("what", SHOWN)
+@pytest.mark.parametrize("method", ["DISPLACEMENT", "BOTH"])
+def test_displaced(stage, method, what):
+    displace(stage, method)
+    show(stage, what)
+    stage.check(tolerance=tolerance_of(method, what))
+    assert not stage.warnings
+
+
+@pytest.mark.parametrize("what", ["position", "normal"])
+@pytest.mark.parametrize("method", BOTH_FROM_5)
+def test_flat_faces(stage, method, what):
+    stage.object.data.shade_flat()
+    displace(stage, method)
+    show(stage, what)
+    stage.check(tolerance=tolerance_of(method, what))
+
+
+@from_5
+@pytest.mark.parametrize("what", ["position", "normal"])
+@pytest.mark.parametrize("method", ["DISPLACEMENT", "BOTH", "BUMP"])
+def test_sharp_edges_and_flat_faces_among_smooth_ones(stage, method, what):
+    harden(stage)
+    displace(stage, method)
+    show(stage, what)
+    stage.check(tolerance=tolerance_of(method, what))
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("coordinates", ["Object", "UV"])
+@pytest.mark.parametrize("method", ["DISPLACEMENT", "BOTH", "BUMP"])
+def test_seen_from_behind(stage, method, coordinates, mirrored):
+    see_from_below(stage)
+    if mirrored:
+        stage.object.scale.x *= -1
+    displace(stage, method)
+    node = next(n for n in stage.tree.nodes if n.bl_idname == "ShaderNodeTexCoord")
+    for link in list(node.outputs["Object"].links):
+        stage.link(node.outputs[coordinates], link.to_socket)
+    show(stage, "normal")
+    stage.check(tolerance=tolerance_of(method, "normal"))
+
+
+@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize("space", ["OBJECT", "WORLD"])
+def test_flat_and_in_both_spaces(stage, space, flat):
+    if flat:
+        stage.object.data.shade_flat()
+    displace(stage, "DISPLACEMENT", space=space)
+    show(stage, "position")
+    stage.check(tolerance=1e-3)
+
+
+@pytest.mark.parametrize("what", ["position", "normal"])
+@pytest.mark.parametrize("method", BOTH_FROM_5)
+@pytest.mark.parametrize("space", ["TANGENT", "OBJECT", "WORLD"])
+def test_vectors(stage, space, method, what):
+    displace(stage, method, "ShaderNodeVectorDisplacement", space=space)
+    show(stage, what)
+    stage.check(tolerance=tolerance_of(method, what))
+
+
+@from_5
+@pytest.mark.parametrize("base", ["ORIGINAL", "DISPLACED"])
+@pytest.mark.parametrize("method", ["DISPLACEMENT", "BOTH"])
+def test_normal_maps(stage, method, base):
+    displace(stage, method)
+    node = stage.new("ShaderNodeNormalMap", base=base)
+    node.inputs["Color"].default_value, node.inputs["Strength"].default_value = (0.7, 0.4, 0.8, 1.0), 0.7
+    stage.show(node.outputs[0])
+    stage.check(tolerance=tolerance_of(method, "normal"))
+
+
+@pytest.mark.parametrize("second_method", [*BOTH_FROM_5, "BUMP"])
+def test_faces_of_two_materials(stage, second_method):
+    """What both have is moved once, as the first face says; normals are made of those faces alone that displacement shapes."""
+    plain = stage.material.copy()
+    displace(stage, "DISPLACEMENT")
+    show(stage, "normal")
+    second = stage.material.copy()
+    second.displacement_method = second_method
+    node = next(n for n in second.node_tree.nodes if n.bl_idname == "ShaderNodeDisplacement")
+    node.inputs["Scale"].default_value = -0.3
+    mesh = stage.object.data
+    mesh.materials.append(second)
+    mesh.materials.append(plain)
+    columns = round(len(mesh.polygons) ** 0.5)
+    mesh.polygons.foreach_set("material_index", [(k // columns) // 4 for k in range(len(mesh.polygons))])
+    stage.check(tolerance=2e-2 if second_method != "DISPLACEMENT" else 1e-3)
+
+
+def add_second(stage):
+    second = bpy.data.objects.new("Second", stage.object.data)
+    second.location, second.scale = (0.4, 1.2, 0.6), (1.0, 1.3, 0.8)
+    stage.scene.collection.objects.link(second)
+    return second
+
+
+def test_what_objects_share_is_moved_once(stage):
+    """Two objects of one mesh; what the first one's material says holds for both, and the mesh itself stays as it was."""
+    add_second(stage)
+    before = np.array([v.co for v in stage.object.data.vertices])
+    displace(stage, "DISPLACEMENT")
+    show(stage, "position")
+    stage.check(tolerance=1e-3)
+    assert np.array_equal(before, np.array([v.co for v in stage.object.data.vertices]))
+    again = stage.ours()
+    assert np.array_equal(again, stage.ours())
+
+
+def test_objects_with_materials_of_their_own_are_moved_apart(stage):
+    second = add_second(stage)
+    displace(stage, "DISPLACEMENT")
+    show(stage, "position")
+    second.material_slots[0].link = "OBJECT"
+    second.material_slots[0].material = other = stage.material.copy()
+    node = next(n for n in other.node_tree.nodes if n.bl_idname == "ShaderNodeDisplacement")
+    node.inputs["Scale"].default_value = -0.2
+    stage.check(tolerance=1e-3)
+
+
+def test_images_move_what_they_cover(stage):
+    image = bpy.data.images.new("Heights", 8, 8, float_buffer=True)
+    image.pixels.foreach_set(np.random.default_rng(3).random(256).astype(np.float32))
+    image.update()
+    texture = stage.new("ShaderNodeTexImage", interpolation="Linear")
+    texture.image = image
+    node = stage.new("ShaderNodeDisplacement")
+    node.inputs["Scale"].default_value = 0.2
+    stage.link(texture.outputs["Color"], node.inputs["Height"])
+    output = next(n for n in stage.tree.nodes if n.type == "OUTPUT_MATERIAL")
+    stage.link(node.outputs[0], output.inputs["Displacement"])
+    stage.material.displacement_method = "DISPLACEMENT"
+    show(stage, "normal")
+    stage.check(tolerance=1e-3)
+
+
+def test_nothing_to_trace_yet(stage):
+    """Nodes that trace rays see nothing while the surface is displaced."""
+    node = stage.new("ShaderNodeDisplacement")
+    stage.link(stage.new("ShaderNodeAmbientOcclusion").outputs["AO"], node.inputs["Height"])
+    output = next(n for n in stage.tree.nodes if n.type == "OUTPUT_MATERIAL")
+    stage.link(node.outputs[0], output.inputs["Displacement"])
+    stage.material.displacement_method = "DISPLACEMENT"
+    show(stage, "position")
+    assert np.isfinite(stage.ours()).all()
