@@ -15,9 +15,8 @@ from gi_engine.sameness import same
 from gi_engine.sync import Sync
 
 from .conftest import add, mesh
-from .edits import EDITS, objects
+from .edits import EDITS, do, objects
 
-EDITS_A_SEED = 60
 PARTS = ("world", "lights", "attribute_names", "programs", "instances", "meshes", "images")
 
 
@@ -65,6 +64,7 @@ def watched(scene):
     scene.world = bpy.data.worlds.new("World")
     if bpy.app.version < (5, 0, 0):
         scene.world.use_nodes = True
+    bpy.ops.ed.undo_push(message="Begin")
     made = Watched()
     yield made
     made.close()
@@ -143,19 +143,20 @@ def test_what_is_as_before_does_not_begin_anew(watched):
     assert "restarts" not in again and watched.sync.exported.scene is before
 
 
-def drive(watched, seed: int, edits: int) -> Counter:
-    rng = random.Random(seed)
-    tried: Counter = Counter()
-    for number in range(edits):
-        done = [rng.choice(EDITS) for _ in range(rng.choice((1, 1, 1, 3)))]
-        names = ", ".join(edit.__name__ for edit in done)
-        for edit in done:
-            edit(rng)
-            tried[edit.__name__] += 1
-        watched.settle()
-        where = f"seed {seed}, edit {number}: {names}"
-        compare(watched.sync.exported, fresh(), where)
-    return tried
+def drive(watched, seed: int, rounds: int) -> int:
+    """Every kind of edit once a round, in any order, now and then three at a time. How many that were."""
+    rng, number = random.Random(seed), 0
+    for _ in range(rounds):
+        left = rng.sample(EDITS, len(EDITS))
+        while left:
+            done = [left.pop() for _ in range(min(rng.choice((1, 1, 1, 3)), len(left)))]
+            for edit in done:
+                do(edit, rng)
+            watched.settle()
+            number += len(done)
+            where = f"seed {seed}, edit {number}: {', '.join(edit.__name__ for edit in done)}"
+            compare(watched.sync.exported, fresh(), where)
+    return number
 
 
 def compare(synced, wanted, where: str) -> None:
@@ -171,11 +172,10 @@ def compare(synced, wanted, where: str) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_random_edits_leave_what_a_fresh_export_has(watched, seed):
-    drive(watched, seed, EDITS_A_SEED)
+    drive(watched, seed, 1)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100, 120))
 def test_thousands_of_random_edits(watched, seed):
-    tried = drive(watched, seed, 300)
-    assert set(tried) == {edit.__name__ for edit in EDITS}
+    assert drive(watched, seed, 10) > 400
