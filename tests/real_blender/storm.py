@@ -1,7 +1,8 @@
 """Inside Blender with a window: what people do to an engine at work, again and again. F12 and Esc, another engine, another file, undo, a view that
 is turned; then memory must be what it was once all was warm, and the window must have answered all the time.
 
-    blender FILE.blend --python storm.py -- [TIMES] [ENGINE]     TIMES of each (10); ENGINE: GI_ENGINE, or CYCLES to see Blender's own share
+    blender FILE.blend --python storm.py -- [TIMES] [ENGINE] [PART…]     TIMES of each (10); ENGINE: GI_ENGINE, or CYCLES to see Blender's own
+                                                                         share; PARTS: keys of PARTS below, all unless told otherwise
 """
 
 import random
@@ -203,10 +204,34 @@ def add_on(number):
 files = []
 
 
+def renders_and_stops():
+    bpy.context.preferences.view.render_display_type = "AREA"
+    yield from again("F12 and Esc", f12_and_esc)
+    with in_window():
+        bpy.context.area.type = "VIEW_3D"  # the render took its place
+    bpy.context.preferences.view.render_display_type = "NONE"
+    yield 1
+
+
+def switches():
+    if ENGINE == "GI_ENGINE":
+        yield from again("add-on off and on", add_on)
+
+
+PARTS = {
+    "f12": renders_and_stops,
+    "turn": turn_the_view,
+    "undo": lambda: again("undo and redo", undo_storm),
+    "engines": lambda: again("another engine", other_engine),
+    "files": lambda: again("another file", other_file),
+    "add-on": switches,
+}
+
+
 def story():
     scene = prepare()
     preferences = bpy.context.preferences
-    preferences.view.render_display_type = "AREA"
+    preferences.view.render_display_type = "NONE"
     preferences.edit.undo_steps = 8
     yield 2
     with tempfile.TemporaryDirectory() as folder:
@@ -214,17 +239,8 @@ def story():
         for k, path in enumerate(files):
             scene.gi_engine.integrator = INTEGRATORS[k]
             bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-        yield from again("F12 and Esc", f12_and_esc)
-        with in_window():
-            bpy.context.area.type = "VIEW_3D"  # the render took its place
-        preferences.view.render_display_type = "NONE"
-        yield 1
-        yield from turn_the_view()
-        yield from again("undo and redo", undo_storm)
-        yield from again("another engine", other_engine)
-        yield from again("another file", other_file)
-        if ENGINE == "GI_ENGINE":
-            yield from again("add-on off and on", add_on)
+        for part in given[2:] or PARTS:
+            yield from PARTS[part]()
     assert not failures, "\n".join(failures)
 
 
