@@ -62,7 +62,8 @@ void IrradianceLevel::improve(size_t index, const GatheredIrradiance& gathered) 
 }
 
 void IrradianceLevel::smooth(ThreadPool& pool, const std::atomic<bool>& cancelled, int pass, size_t first) {
-  if (smoothing_.size() != size()) smoothing_ = IrradianceSmoothing(cache_, pool, cancelled);
+  if (first >= size()) return;
+  if (!smoothing_.serves(size(), first)) smoothing_ = IrradianceSmoothing(cache_, first, pool, cancelled);
   if (cancelled) return;
   pool.for_each(int((size() + kBatch - 1) / kBatch), cancelled, [&](int batch) {
     for (size_t i = std::max(first, size_t(batch) * kBatch); i < std::min(size(), size_t(batch + 1) * kBatch); ++i) {

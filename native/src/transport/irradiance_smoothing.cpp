@@ -27,7 +27,8 @@ bool are_of_one_surface(const IrradianceRecord& a, const IrradianceRecord& b, fl
 
 }  // namespace
 
-IrradianceSmoothing::IrradianceSmoothing(const IrradianceCache& cache, ThreadPool& pool, const std::atomic<bool>& cancelled) {
+IrradianceSmoothing::IrradianceSmoothing(const IrradianceCache& cache, size_t first, ThreadPool& pool, const std::atomic<bool>& cancelled)
+    : first_(first) {
   const std::vector<IrradianceRecord>& records = cache.records();
   std::vector<Vec3> positions;
   for (const IrradianceRecord& r : records) positions.push_back(r.position);
@@ -36,7 +37,7 @@ IrradianceSmoothing::IrradianceSmoothing(const IrradianceCache& cache, ThreadPoo
   std::vector<std::vector<uint32_t>> found(records.size());
   pool.for_each(int((records.size() + kBatch - 1) / kBatch), cancelled, [&](int batch) {
     std::vector<PointTree::Found> near;
-    for (size_t i = size_t(batch) * kBatch; i < std::min(records.size(), size_t(batch + 1) * kBatch); ++i) {
+    for (size_t i = std::max(first, size_t(batch) * kBatch); i < std::min(records.size(), size_t(batch + 1) * kBatch); ++i) {
       const auto accepts = [&](uint32_t k) { return are_of_one_surface(records[i], records[tree.order()[k]], overlap); };
       const float farthest = 1.001f * reach_of(records[i], overlap);
       tree.nearest(records[i].position, std::end(kSteps)[-1], sqr(farthest), near, accepts);

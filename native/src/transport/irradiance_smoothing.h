@@ -15,14 +15,16 @@ class IrradianceSmoothing {
   };
 
   IrradianceSmoothing() = default;
-  // Finds the neighbours: on the same surface, and nearer than anything that either of them sees.
-  IrradianceSmoothing(const IrradianceCache& cache, ThreadPool& pool, const std::atomic<bool>& cancelled);
+  // Finds the neighbours of all records from `first` on: on the same surface, and nearer than anything that either of them sees.
+  IrradianceSmoothing(const IrradianceCache& cache, size_t first, ThreadPool& pool, const std::atomic<bool>& cancelled);
 
-  size_t size() const { return begin_.empty() ? 0 : begin_.size() - 1; }
+  // Whether it knows the neighbours of all but the `first` of so many records.
+  bool serves(size_t records, size_t first) const { return begin_.size() == records + 1 && first_ <= first; }
   // `records`: all of the cache's, in its order. `strength`: how many times its standard deviation a mean may be off; 0: none.
   IrradianceRecord smooth(const std::vector<Gathered>& records, uint32_t record, float strength) const;
 
  private:
+  size_t first_ = 0;
   std::vector<uint32_t> begin_, neighbours_;  // of each record, the nearest first, itself before all
 };
 
