@@ -55,6 +55,7 @@ class Refiner:
         self.error = ""
         self.stage = ""  # what is done while no picture comes
         self.warnings: list[str] = []
+        self.lacks_denoiser = False
         self.starts = 0  # how often a picture was begun
         self._wish: Job | None = None
         self._closed = False
@@ -167,6 +168,7 @@ class Refiner:
             guides = {guide: session.read(name) for guide, name in wishes.guides.items()}
             with contextlib.suppress(RuntimeError):
                 found = denoise(pixels, guides, self.denoiser, wishes.quality, wishes.prefilter)
+                self.lacks_denoiser = found is None
                 pixels = pixels if found is None else found
         elif wishes and job.shown == "Combined" and samples > job.start_sample:
             return  # the last clean picture is better than a newer noisy one

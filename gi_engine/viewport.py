@@ -42,6 +42,7 @@ class Viewport:
             self.sync.update(depsgraph, context.space_data)
         except ExportError as error:
             self.failure = str(error)
+        self.refiner.redraw()  # Blender does not draw after every change, a script's of a setting among them
 
     def draw(self, engine, context, depsgraph) -> None:
         if self.sync.is_stale(depsgraph):
@@ -99,7 +100,8 @@ class Viewport:
         if picture is None:
             return f"{name} | Preparing{stage}"
         paused = " | Paused" if self.job.paused else ""
-        return f"{name} | Sample {picture.samples}/{settings.samples} | {picture.seconds:.1f} s{stage}{paused}"
+        noisy = " | No denoiser in this Blender" if settings.denoising and self.refiner.lacks_denoiser else ""
+        return f"{name} | Sample {picture.samples}/{settings.samples} | {picture.seconds:.1f} s{stage}{paused}{noisy}"
 
 
 def make_job(exported, camera, film: Film, own, resolved) -> Job:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import threading
 import time
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -15,7 +16,7 @@ from gi_engine import native, viewport
 from gi_engine.export import export
 from gi_engine.look import border_region, camera_of, reduced
 from gi_engine.refine import Refiner, scales
-from gi_engine.scene_data import Film
+from gi_engine.scene_data import Denoising, Film
 
 from .conftest import add, mesh
 
@@ -133,6 +134,33 @@ def test_caches_outlast_camera_moves_and_can_be_seen(job, integrator, shown, par
     if integrator == "photon_map":
         assert "photon seconds" in session.figures()
         assert session.kept()["global"][0, 0] == parameters["global_photons"]
+
+
+class Engine:
+    """Counts how often it is to be drawn."""
+
+    tags = 0
+
+    def tag_redraw(self):
+        self.tags += 1
+
+
+def test_a_change_is_drawn_though_blender_does_not_ask_for_it(lit):
+    engine = Engine()
+    shown = viewport.Viewport(engine)
+    shown.update(SimpleNamespace(space_data=None), bpy.context.evaluated_depsgraph_get())
+    assert engine.tags == 1 and not shown.failure
+    shown.close()
+
+
+def test_the_header_says_that_there_is_no_denoiser(job):
+    job.settings.denoising = Denoising("NONE", "FAST", "FAST")
+    shown = viewport.Viewport(engine := Engine())
+    shown.refiner.denoiser = ()  # folders to look in
+    shown.submit(job)
+    wait_for(lambda: shown.refiner.picture and shown.refiner.picture.samples == 3)
+    assert "No denoiser" in shown.status(shown.refiner.picture) and engine.tags
+    shown.close()
 
 
 def test_the_same_job_is_not_begun_again(job):
