@@ -88,6 +88,7 @@ class Objects:
     instances: list  # by prototype
     lights: list[tuple]  # name, session_uid of the lamp, matrix, visibility, session_uid of the object or 0
     warnings: list[str]
+    order: list[int]
 
 
 class Sync:
@@ -150,12 +151,15 @@ class Sync:
             walked.instances or [None] * len(walked.found.prototypes),
             [(n, uid_of(light), matrix, seen, uid_of(item)) for n, light, matrix, seen, item in walked.found.lights],
             walked.warnings,
+            order_of(depsgraph),
         )
         return found
 
     def shade(self, depsgraph, film) -> Exported | None:
         """Reads materials, lamps and the world alone; None where that is not enough."""
         old, known = self.exported.scene, self._objects
+        if any(isinstance(u.id, bpy.types.Object) for u in depsgraph.updates) and order_of(depsgraph) != known.order:
+            return None
         warnings, out = Warnings(), Scene(camera=old.camera, film=film)
         walk = Walk(depsgraph.view_layer_eval, warnings)
         lights = self.lights(depsgraph, walk)
@@ -243,6 +247,11 @@ def look_of(prototype) -> tuple:
         if f.name not in {"mesh", "materials", "object", "parent", "matrices", "randoms"}
     }
     return [uid_of(material) for material in prototype.materials], settings
+
+
+def order_of(depsgraph) -> list[int]:
+    """Objects in the order that Blender goes through them in: parents come early, and nothing tells of another order."""
+    return [uid_of(item) for item in depsgraph.objects]
 
 
 def uid_of(item) -> int:

@@ -143,6 +143,16 @@ def test_what_is_as_before_does_not_begin_anew(watched):
     assert "restarts" not in again and watched.sync.exported.scene is before
 
 
+def test_objects_stay_in_blenders_order(watched):
+    """Which a parent changes, though it says of the child alone that it changed."""
+    add(bpy.context.scene, "Late", mesh())
+    later = add(bpy.context.scene, "Later", mesh())
+    watched.settle()
+    objects("LIGHT")[0].parent = later
+    watched.settle()
+    compare(watched.sync.exported, fresh(), "a lamp with a parent")
+
+
 def drive(watched, seed: int, rounds: int) -> int:
     """Every kind of edit once a round, in any order, now and then three at a time. How many that were."""
     rng, number = random.Random(seed), 0
