@@ -17,6 +17,7 @@ from gi_engine.export import export
 from gi_engine.look import border_region, camera_of, reduced
 from gi_engine.refine import Refiner, scales
 from gi_engine.scene_data import Denoising, Film
+from gi_engine.session import Session
 
 from .conftest import add, mesh
 
@@ -134,6 +135,24 @@ def test_caches_outlast_camera_moves_and_can_be_seen(job, integrator, shown, par
     if integrator == "photon_map":
         assert "photon seconds" in session.figures()
         assert session.kept()["global"][0, 0] == parameters["global_photons"]
+
+
+def test_a_first_look_at_photons_works_out_no_records(job):
+    """It has no time for them, and shows all light nevertheless."""
+    wish = of_integrator(job, "photon_map", global_light="CACHED", global_photons=3_000_000, caustic_photons=1000)
+    scene = dataclasses.replace(wish.scene, camera=wish.camera, film=reduced(wish.film, 8))
+    settings = dataclasses.replace(wish.settings, samples=1, time_limit=0.2)
+    sessions, pictures = [None], []
+    for _ in range(2):
+        sessions.append(
+            Session(scene, settings, earlier=sessions[-1], built=sessions[-1] and sessions[-1].native_scene)
+        )
+        with sessions[-1] as session:
+            while not session.wait():
+                pass
+        pictures.append(session.read("Combined")[..., :3].mean())
+    assert ["cache records" in session.native.figures() for session in sessions[1:]] == [True, False]
+    assert pictures[1] == pytest.approx(pictures[0], rel=0.2) and pictures[1] > 0.01
 
 
 class Engine:

@@ -148,7 +148,7 @@ class PhotonMapIntegrator final : public Integrator {
   void render_pass(const RenderContext& context, int pass, Film& film) override {
     if (!built_) build(context, film);
     if (context.cancelled) return;
-    if (way_ == GlobalLight::kCached) {
+    if (caches_) {
       records_.before_pass(context, film, pass, [&](const CameraRay& from, const PathState& state, Sampler& sampler) -> GatheredRay {
         EndingPath ending{CameraPath(from), true};
         ending.path.state = state;
@@ -166,7 +166,7 @@ class PhotonMapIntegrator final : public Integrator {
     });
   }
   void finish_pass(const RenderContext& context, int pass) override {
-    if (way_ == GlobalLight::kCached) records_.after_pass(context, pass);
+    if (caches_) records_.after_pass(context, pass);
   }
 
   void take_over(const Kept& kept) override {
@@ -233,7 +233,7 @@ class PhotonMapIntegrator final : public Integrator {
                       [&](Vec3 normal) { return irradiance_.at(global_.map, scene, point.position, normal, ending.last_distance); });
     switch (way_) {
       case GlobalLight::kGathered: return {};
-      case GlobalLight::kCached: return records_.read(point, bsdf, result);
+      case GlobalLight::kCached: return caches_ ? records_.read(point, bsdf, result) : std::optional<Rgb>();
       case GlobalLight::kPhotons:
         return light_of(point, bsdf, [&](Vec3 normal) {
           return std::optional(global_.map.irradiance(point.position, normal, global_.reach, global_.count, point.path, &scene));
@@ -250,6 +250,8 @@ class PhotonMapIntegrator final : public Integrator {
     // A first look at what another view has photons of: at once, with what there is.
     const bool has_global = way_ != GlobalLight::kNone;
     const bool glances = continues_ && context.time_limit > 0.0 && caustic_.is_begun() && (!has_global || global_.is_begun());
+    // Few records would be worked out in that time, and slowly; one ray for each pixel is quicker.
+    caches_ = way_ == GlobalLight::kCached && (!glances || records_.takes_over());
     if (glances) {
       if (has_global) glance(context, film, gathers(), global_count_, global_);
       glance(context, film, false, caustic_count_, caustic_);
@@ -395,6 +397,7 @@ class PhotonMapIntegrator final : public Integrator {
   Stock global_, caustic_;
   IrradianceMap irradiance_;
   bool built_ = false, continues_ = false;
+  bool caches_ = false;  // has records, or is to have them
 };
 
 // A row for each photon; the first row says how many paths were sent for them.

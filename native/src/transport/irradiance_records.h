@@ -46,6 +46,7 @@ class IrradianceRecords {
 
   size_t size() const;
   void take_over(const Kept& kept);  // before the first pass
+  bool takes_over() const { return !taken_over_.empty(); }
   Kept keep() const;
 
  private:
