@@ -20,7 +20,7 @@ from .scene_data import Camera, Film, Scene, Settings
 from .session import RenderFailed, Session
 
 FIRST_PIXELS = 12_000  # of the first picture after a change: as many as are traced before it feels slow
-FIRST_SECONDS = 0.1  # that caches may take of it, twice: what they do not know by then is path traced
+FIRST_SECONDS = 0.08  # that caches may take of it, twice: what they do not know by then is path traced
 POLL_SECONDS = 0.005
 
 
