@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from_5 = pytest.mark.skipif(
-    bpy.app.version < (5, 0, 0), reason="Cycles 4.5 bumps what is displaced already, or tears edges open"
+    bpy.app.version < (5, 0, 0), reason="we follow Cycles 5; 4.5 differs here, and not all of why is known"
 )
 BOTH_FROM_5 = ["DISPLACEMENT", pytest.param("BOTH", marks=from_5)]
 
@@ -200,11 +200,15 @@ def test_images_move_what_they_cover(stage):
 
 
 def test_nothing_to_trace_yet(stage):
-    """Nodes that trace rays see nothing while the surface is displaced."""
+    """Nodes that trace rays meet nothing while the surface is displaced: all is open."""
     node = stage.new("ShaderNodeDisplacement")
+    node.inputs["Height"].default_value = 1.0
     stage.link(stage.new("ShaderNodeAmbientOcclusion").outputs["AO"], node.inputs["Height"])
     output = next(n for n in stage.tree.nodes if n.type == "OUTPUT_MATERIAL")
     stage.link(node.outputs[0], output.inputs["Displacement"])
     stage.material.displacement_method = "DISPLACEMENT"
     show(stage, "position")
-    assert np.isfinite(stage.ours()).all()
+    traced = stage.ours()
+    for link in list(node.inputs["Height"].links):
+        stage.tree.links.remove(link)
+    np.testing.assert_array_equal(traced, stage.ours())
