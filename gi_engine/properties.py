@@ -194,9 +194,16 @@ def shared_parameters(descriptors: list[dict]) -> dict[str, dict]:
     return {p["name"]: p for d in descriptors for p in d["parameters"] if p["name"] in SHARED}
 
 
+def draw_at_once(properties: dict) -> None:
+    """Of a value that a script sets Blender tells a viewport only where there is a function to be called."""
+    for made in properties.values():
+        made.keywords.setdefault("update", lambda group, context: None)
+
+
 def integrator_group(descriptor: dict) -> type:
     """The PropertyGroup of one integrator's own parameters."""
     own = {p["name"]: property_of(p) for p in descriptor["parameters"] if p["name"] not in SHARED}
+    draw_at_once(own)
     return type(f"GI_PG_{descriptor['id']}", (bpy.types.PropertyGroup,), {"__annotations__": own})
 
 
@@ -211,6 +218,7 @@ def settings_group(descriptors: list[dict], groups: dict[str, type], compared: t
         annotations[name] = property_of(parameter)
     for name in annotations.keys() & SHARED.keys():
         annotations[name].keywords["update"] = take_over(name)
+    draw_at_once(annotations)
     annotations["lightmap"] = PointerProperty(type=GI_PG_lightmap)
     annotations["compare"] = PointerProperty(type=compared)
     for identifier, group in groups.items():

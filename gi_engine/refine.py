@@ -19,9 +19,19 @@ from .look import reduced
 from .scene_data import Camera, Film, Scene, Settings
 from .session import RenderFailed, Session
 
-FIRST_PIXELS = 12_000  # of the first picture after a change: as many as are traced before it feels slow
-FIRST_SECONDS = 0.08  # that caches may take of it, twice: what they do not know by then is path traced
+AIM_SECONDS = 0.05  # for the first picture after a change: its pixels become fewer or more until it takes about as long
+FIRST_PIXELS, LEAST_PIXELS, MOST_PIXELS = (
+    4_000,
+    500,
+    12_000,
+)  # of it: before it was ever timed, and within which it stays
+CACHE_SECONDS = 0.025  # that caches may take of it: what they do not know by then is path traced
+PATIENCE = 0.1  # seconds for which a first picture is finished though something newer is wanted, or none would come while a view turns
+MOST_PATIENCE = 2.0  # the same, after several that took longer
 POLL_SECONDS = 0.005
+SCALES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)  # by how much the resolution may be reduced
+
+_running: set = set()  # Refiners whose threads have not ended
 
 
 @dataclass
@@ -62,6 +72,9 @@ class Refiner:
         self._wake = threading.Condition()
         self._built: tuple | None = None  # the Scene, and what the native side made of it
         self._last: Session | None = None  # which knows of light in the scene, by caches and photons
+        self._first = FirstPicture()
+        self._patience = PATIENCE
+        _running.add(self)
         self._thread = threading.Thread(target=self._run, name="GI Engine viewport", daemon=True)
         self._thread.start()
 
@@ -71,16 +84,22 @@ class Refiner:
             self.starts += 1
             self._wake.notify()
 
-    def close(self) -> None:
-        """Ends the thread, and waits for it."""
+    def close(self, wait: bool = True) -> None:
+        """Ends the thread, as soon as what it is at can be left; `wait`: until then."""
         with self._wake:
             self._closed = True
             self._wake.notify()
-        if threading.current_thread() is not self._thread:
+        if wait and threading.current_thread() is not self._thread:
             self._thread.join()
-        self._forget()
 
     def _run(self) -> None:
+        try:
+            self._work()
+        finally:
+            self._forget()
+            _running.discard(self)
+
+    def _work(self) -> None:
         while not self._closed:
             with self._wake:
                 while self._wish is None and not self._closed:
@@ -94,7 +113,6 @@ class Refiner:
             except (native.NativeMissing, RenderFailed, ValueError, RuntimeError, MemoryError) as error:
                 self.error, self._last = str(error) or "out of memory", None
                 self._tell()
-        self._forget()
 
     def _forget(self) -> None:
         self._last = self._built = None
@@ -107,22 +125,26 @@ class Refiner:
             self._closed = True
 
     def _refine(self, job: Job) -> None:
+        before = None
         if self._built is None or self._built[0] is not job.scene:
             before, self._last = self._built and self._built[1], None
             built = native.build_scene(job.scene, job.settings.threads, movable=True, before=before)
             self._built = (job.scene, built)
             self.warnings = list(built.warnings)
         started = time.monotonic()
-        for number, scale in enumerate(scales(job.film)):
-            samples = job.settings.samples if scale == 1 else 1
-            if not self._stage(job, scale, samples, started, FIRST_SECONDS if number == 0 and scale > 1 else 0.0):
+        for scale in scales(job.film, self._first.pixels_of(job.settings.integrator)):
+            if not self._stage(job, scale, started):
                 return
+            before = None  # freeing it did not delay the picture
 
-    def _stage(self, job: Job, scale: int, samples: int, started: float, limit: float) -> bool:
+    def _stage(self, job: Job, scale: int, started: float) -> bool:
         """One session at 1/scale of the resolution. False where something newer is wanted."""
+        samples = job.settings.samples if scale == 1 else 1
         threads = job.settings.threads or max(1, (os.cpu_count() or 2) - 1)  # one is left to the window
+        is_first = scale > 1 and (self.picture is None or self.picture.job is not job)
+        limit = 2 * CACHE_SECONDS if is_first else 0.0  # caches take half of it at most
         settings = dataclasses.replace(
-            job.settings, samples=samples, threads=threads, time_limit=2 * limit, noise_target=0.0
+            job.settings, samples=samples, threads=threads, time_limit=limit, noise_target=0.0
         )
         scene = dataclasses.replace(job.scene, camera=job.camera, film=reduced(job.film, scale))
         session = self._last = Session(scene, settings, built=self._built[1], earlier=self._knowing(settings))
@@ -130,7 +152,7 @@ class Refiner:
         with session:
             while True:
                 done = session.native.wait(POLL_SECONDS)
-                if self._outdated():
+                if self._outdated() and not (is_first and self._finishes(started)):
                     session.native.cancel()
                     return False
                 progress = session.progress()
@@ -142,9 +164,22 @@ class Refiner:
                     clean = scale == 1 and (shown >= clean_at or shown == samples)
                     clean_at = 2 * shown if clean else clean_at
                     self._publish(session, job, shown if scale == 1 else 0, time.monotonic() - started, clean)
+                    if is_first:
+                        self._first.took(self.picture)
+                        self._patience = PATIENCE
                 if done:
                     break
         return not self._outdated()
+
+    def _finishes(self, started: float) -> bool:
+        """Whether a first picture that is out of date is finished nevertheless. After one that was not, there is more patience with the next:
+        where changes come all the time, pictures do, too."""
+        if self._closed:
+            return False
+        if time.monotonic() - started < self._patience:
+            return True
+        self._patience = min(2 * self._patience, MOST_PATIENCE)
+        return False
 
     def _note(self, stage: str) -> None:
         """Passes on what the integrator is at, without what it counts meanwhile."""
@@ -176,13 +211,36 @@ class Refiner:
         self._tell()
 
 
-def scales(film: Film) -> list[int]:
-    """By how much the resolution is reduced, first to last."""
+class FirstPicture:
+    """How many pixels it has, by how long the last ones took."""
+
+    def __init__(self):
+        self.pixels, self.integrator = FIRST_PIXELS, ""
+
+    def pixels_of(self, integrator: str) -> int:
+        if integrator != self.integrator:
+            self.pixels, self.integrator = FIRST_PIXELS, integrator
+        return self.pixels
+
+    def took(self, picture: Picture) -> None:
+        height, width, _ = picture.pixels.shape
+        pace = AIM_SECONDS / max(picture.seconds, 1e-3)
+        if pace < 1 or pace > 2:  # between, pixels that change their size all the time would be worse
+            self.pixels = int(min(max(height * width * min(max(pace, 0.25), 2.5), LEAST_PIXELS), MOST_PIXELS))
+
+
+def scales(film: Film, pixels: int = FIRST_PIXELS) -> list[int]:
+    """By how much the resolution is reduced, first to last; `pixels` of the first picture."""
     x0, y0, x1, y1 = film.region
-    first = 1
-    while (x1 - x0) * (y1 - y0) > FIRST_PIXELS * first * first:
-        first *= 2
+    enough = (scale for scale in SCALES if (x1 - x0) * (y1 - y0) <= pixels * scale * scale)
+    first = next(enough, SCALES[-1])
     return [first, max(1, first // 4), 1] if first > 4 else [first, 1] if first > 1 else [1]
+
+
+def close_all() -> None:
+    """Waits for the end of all threads."""
+    for refiner in list(_running):
+        refiner.close()
 
 
 def rgba(pixels: np.ndarray) -> np.ndarray:

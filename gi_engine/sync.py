@@ -100,10 +100,14 @@ class Sync:
         self.walks = 0
         self._objects: Objects | None = None
         self._frame: tuple = ()
+        self._local: tuple = ()
+        self._shown: frozenset = frozenset()
 
-    def is_stale(self, depsgraph) -> bool:
+    def is_stale(self, depsgraph, view=None) -> bool:
         """Whether something has changed that Blender may have said nothing of."""
-        return self.exported is None or frame_of(depsgraph) != self._frame
+        if self.exported is None or frame_of(depsgraph) != self._frame or local_of(view) != self._local:
+            return True
+        return any(self._local) and shown_objects(depsgraph, view) != self._shown
 
     def update(self, depsgraph, view=None) -> bool:
         """Takes over what has changed; True where the picture has to begin anew. `view`: the 3D viewport, for local view.
@@ -111,7 +115,10 @@ class Sync:
         Raises ExportError."""
         changes, frame = changes_of(depsgraph), frame_of(depsgraph)
         before, frame_is_new = self.exported, frame != self._frame
-        stands = before and not frame_is_new and not self.known.programs.look_elsewhere
+        shown = shown_objects(depsgraph, view)
+        same_frame = before and not frame_is_new and shown == self._shown
+        stands = same_frame and not self.known.programs.look_elsewhere
+        self._local, self._shown = local_of(view), shown
         if stands and not changes - {"camera"}:
             return False
         if stands and not changes - {"camera", "settings"}:
@@ -125,7 +132,7 @@ class Sync:
         if frame[:2] != self._frame[:2]:
             self.known = KnownScene()  # another depsgraph, which tells of its own
         self.known.begin(tag(depsgraph, frame_is_new), film.aovs)
-        shaded = before and not frame_is_new and not changes - ONE_BY_ONE and self.shade(depsgraph, film)
+        shaded = same_frame and not changes - ONE_BY_ONE and self.shade(depsgraph, film)
         exported = shaded or self.walk(depsgraph, view)
         self.known.sweep(meshes=not shaded)
         self._frame = frame
@@ -264,6 +271,17 @@ def evaluated(items, depsgraph) -> dict:
 
 def replaced(instance, materials: list[int]):
     return instance if instance.materials == materials else dataclasses.replace(instance, materials=materials)
+
+
+def local_of(view) -> tuple:
+    """Whether a 3D viewport shows objects of its own choice."""
+    return (view.local_view is not None, view.use_local_collections) if view else ()
+
+
+def shown_objects(depsgraph, view) -> frozenset:
+    """Objects that are not hidden, in the viewport: where they come or go, Blender tells of a changed scene, of no object."""
+    layer = depsgraph.view_layer
+    return frozenset(uid_of(o) for o in depsgraph.objects if o.original.visible_get(view_layer=layer, viewport=view))
 
 
 def frame_of(depsgraph) -> tuple:

@@ -15,7 +15,7 @@ from .export.camera import set_depth_of_field
 from .export.film import export_film
 from .export.settings import resolve
 from .look import border_region, camera_of, same_camera
-from .refine import Job, Picture, Refiner
+from .refine import Job, Picture, Refiner, close_all
 from .scene_data import Denoising, Film
 from .sync import Sync
 
@@ -32,7 +32,8 @@ class Viewport:
         _open.add(self)
 
     def close(self) -> None:
-        self.refiner.close()
+        """Its thread ends when it can: nobody waits for it."""
+        self.refiner.close(wait=False)
         _open.discard(self)
 
     def update(self, context, depsgraph) -> None:
@@ -45,7 +46,7 @@ class Viewport:
         self.refiner.redraw()  # Blender does not draw after every change, a script's of a setting among them
 
     def draw(self, engine, context, depsgraph) -> None:
-        if self.sync.is_stale(depsgraph):
+        if self.sync.is_stale(depsgraph, context.space_data):
             self.update(context, depsgraph)
         if self.sync.exported:
             self.submit(self.wanted(context, depsgraph))
@@ -99,9 +100,9 @@ class Viewport:
         stage = self.refiner.stage and f" | {self.refiner.stage.capitalize()}"
         if picture is None:
             return f"{name} | Preparing{stage}"
-        paused = " | Paused" if self.job.paused else ""
+        paused = "Paused | " if self.job.paused else ""  # first: in narrow views Blender's gizmos cover the end
         noisy = " | No denoiser in this Blender" if settings.denoising and self.refiner.lacks_denoiser else ""
-        return f"{name} | Sample {picture.samples}/{settings.samples} | {picture.seconds:.1f} s{stage}{paused}{noisy}"
+        return f"{paused}{name} | Sample {picture.samples}/{settings.samples} | {picture.seconds:.1f} s{stage}{noisy}"
 
 
 def make_job(exported, camera, film: Film, own, resolved) -> Job:
@@ -169,11 +170,6 @@ def redrawer(engine):
         return found is not None
 
     return redraw
-
-
-def close_all() -> None:
-    for viewport in list(_open):
-        viewport.close()
 
 
 def register() -> None:

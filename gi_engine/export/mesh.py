@@ -17,8 +17,9 @@ from .arrays import is_triangulated, read, read_attribute, triangle_corners
 
 @contextmanager
 def readable(item, mesh):
-    """The mesh of an evaluated object with its attributes: while it is edited, Blender gives but a wrapper of the edit mesh."""
-    if not mesh.polygons or "position" in mesh.attributes:
+    """The mesh of an evaluated object with its attributes: while it is edited, Blender gives but a wrapper of the edit mesh, which has no
+    faces, either, until a window has drawn it."""
+    if "position" in mesh.attributes or not (mesh.is_editmode or mesh.polygons):
         yield mesh
         return
     try:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import gi_engine
-from gi_engine import native, viewport
+from gi_engine import native, refine, viewport
 from gi_engine.export import export
 from gi_engine.look import border_region, camera_of, reduced
 from gi_engine.refine import Refiner, scales
@@ -96,6 +96,122 @@ def test_what_is_newer_replaces_what_is_worked_on(job):
     wait_for(lambda: refiner.picture.job is job and refiner.picture.samples == 3)
     assert refiner.starts == 2 and not refiner.error
     refiner.close()
+
+
+def turned(job, k):
+    """The same, a little to the side."""
+    matrix = job.camera.matrix.copy()
+    matrix[0, 3] += 1e-4 * k
+    return dataclasses.replace(job, camera=dataclasses.replace(job.camera, matrix=matrix))
+
+
+@pytest.mark.parametrize("patience", [0.1, 2e-3])
+def test_pictures_come_while_the_view_turns_all_the_time(job, monkeypatch, patience):
+    """Each wish is newer before a first picture of the last is done, even if there is no time for one."""
+    monkeypatch.setattr(refine, "PATIENCE", patience)
+    monkeypatch.setattr(refine, "MOST_PATIENCE", 1.0)
+    monkeypatch.setattr(refine, "POLL_SECONDS", 1e-4)
+    shown = []
+    refiner = Refiner(lambda: shown.append(refiner.picture.job) or True)
+    end, k = time.monotonic() + 60, 0
+    while len(shown) < 5 and time.monotonic() < end:
+        refiner.show(turned(job, k := k + 1))
+        time.sleep(0.0005)
+    during = len(shown)
+    last = turned(job, -1)
+    refiner.show(last)
+    wait_for(lambda: refiner.picture.job is last and refiner.picture.samples == 3)
+    refiner.close()
+    assert during >= 5 and not refiner.error
+
+
+def test_the_first_picture_has_as_many_pixels_as_there_is_time_for():
+    """However fast the machine, it is back at about the time aimed at after a few, and does not change its size all the time."""
+    film = Film(width=1280, height=720, region=(0, 0, 1280, 720))
+    for microseconds in (0.5, 8, 40, 300):  # a pixel
+        first, sizes = refine.FirstPicture(), []
+        for _ in range(8):
+            scale = scales(film, first.pixels_of("path"))[0]
+            width, height = reduced(film, scale).width, reduced(film, scale).height
+            sizes.append(width * height)
+            first.took(
+                refine.Picture(
+                    np.zeros((height, width, 4), np.float32), film.region, 0, 1e-6 * microseconds * sizes[-1], None
+                )
+            )
+        assert sizes[0] <= refine.FIRST_PIXELS and len(set(sizes[-4:])) == 1
+        seconds = 1e-6 * microseconds * sizes[-1]
+        limits = sizes[-1] < refine.LEAST_PIXELS, sizes[-1] > refine.MOST_PIXELS / 2.5
+        assert seconds < 1.1 * refine.AIM_SECONDS or limits[0]
+        assert seconds > 0.3 * refine.AIM_SECONDS or limits[1]
+    assert first.pixels_of("bdpt") == refine.FIRST_PIXELS  # another integrator: nothing is known of it
+
+
+def test_closing_does_not_wait_for_what_cannot_be_left(job, monkeypatch):
+    """Such as reading a large scene: Blender's window would stand still."""
+    build, begun, goes_on = native.build_scene, threading.Event(), threading.Event()
+
+    def slow(*words, **more):
+        begun.set()
+        goes_on.wait(30)
+        return build(*words, **more)
+
+    monkeypatch.setattr(native, "build_scene", slow)
+    shown = viewport.Viewport(Engine())
+    shown.submit(job)
+    begun.wait(30)
+    start = time.monotonic()
+    shown.close()
+    assert time.monotonic() - start < 1 and shown.refiner._thread.is_alive()
+    goes_on.set()
+    refine.close_all()  # as the add-on does when it is switched off
+    assert not shown.refiner._thread.is_alive() and shown.refiner.picture is None
+
+
+class Pulse:
+    """The longest time for which Python's other threads could not go on."""
+
+    def __enter__(self):
+        self.longest, self.ends = 0.0, False
+        self.thread = threading.Thread(target=self.beat)
+        self.thread.start()
+        return self
+
+    def beat(self):
+        last = time.monotonic()
+        while not self.ends:
+            time.sleep(0.001)
+            now = time.monotonic()
+            self.longest, last = max(self.longest, now - last), now
+
+    def __exit__(self, *_):
+        self.ends = True
+        self.thread.join()
+
+
+def test_native_work_leaves_python_to_others(job):
+    """What is long and not rendering: taking many photons over and handing them out."""
+    parameters = {"global_light": "GATHERED", "global_photons": 20_000, "caustic_photons": 100}
+    settings = dataclasses.replace(job.settings, integrator="photon_map", samples=1, parameters=parameters)
+    scene = dataclasses.replace(job.scene, camera=job.camera, film=reduced(job.film, 8))
+
+    def rendered(kept=None):
+        session = Session(scene, settings, kept=kept)
+        with session:
+            while not session.wait():
+                pass
+        return session
+
+    kept = rendered().native.kept()
+    head, rest = kept["global"][:1], kept["global"][1:]
+    kept["global"] = np.concatenate([head, np.tile(rest, (3_000_000 // len(rest), 1))])
+    many = rendered(kept)
+    for work in (lambda: Session(scene, settings, built=many.native_scene, kept=kept), many.native.kept):
+        with Pulse() as pulse:
+            start = time.monotonic()
+            held = work()
+            took = time.monotonic() - start
+        assert held and took > 0.05 and pulse.longest < 0.5 * took, (took, pulse.longest)
 
 
 def test_a_viewport_that_is_gone_ends_its_thread(job):

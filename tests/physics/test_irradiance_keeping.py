@@ -128,3 +128,28 @@ def test_the_overture_takes_its_share_of_the_time_and_no_more():
     assert math.isfinite(picture.mean())
     _, _, unlimited = render(room(), eye(0), samples=1, pixels=64, record_samples=64)
     assert f"{unlimited.native.figures()['cache records']:.0f} records" in unlimited.progress()["note"]
+
+
+@pytest.mark.parametrize("moments", [(0.0, 0.002, 0.01, 0.05), (0.02,) * 8, (0.3, 0.3)])
+def test_what_was_stopped_anywhere_serves_on(moments):
+    """As often as a camera moves: the light is that of a render which nobody stopped, and nothing that is known is worked out again."""
+    truth, _, whole = render(room(), eye(0), samples=32)
+    scene = dataclasses.replace(room(), camera=eye(0), film=sd.Film(PIXELS, PIXELS, filter="BOX", filter_width=1.0))
+    settings = sd.Settings("irradiance_cache", 32, seed=1, threads=2)
+    session = None
+    for moment in moments:
+        session = Session(scene, settings, built=session and session.native_scene, earlier=session)
+        session.native.start()
+        session.native.wait(moment)
+        session.native.cancel()
+        while not session.native.wait(0.05):
+            pass
+    last = finish(Session(scene, settings, built=session.native_scene, earlier=session))
+    figures = last.native.figures()
+    # Of 25 such renders the mean's standard deviation is .4 %, and pixels are off by 1.2 % on average.
+    picture = last.read("Combined")[..., 0]
+    assert picture.mean() == pytest.approx(truth.mean(), rel=0.02)
+    assert np.abs(picture / truth - 1).mean() < 0.04
+    assert 0.9 < figures["cache records"] / whole.native.figures()["cache records"] < 1.15
+    again = finish(Session(scene, settings, built=session.native_scene, earlier=last)).native.figures()
+    assert again["cache records taken over"] >= figures["cache records"] and again["cache records worked out"] < 20

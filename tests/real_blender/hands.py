@@ -4,6 +4,7 @@ main loop. A story is a generator that yields seconds to wait; Blender ends with
 import contextlib
 import ctypes
 import gc
+import importlib
 import os
 import subprocess
 import sys
@@ -53,6 +54,11 @@ def in_window(kind=None):
 def viewport():
     with in_window("VIEW_3D"):
         return bpy.context.area.spaces.active
+
+
+def engine_module(name):
+    """Of the add-on as it is installed."""
+    return importlib.import_module(next(found for found in sys.modules if found.endswith(f"gi_engine.{name}")))
 
 
 def memory():

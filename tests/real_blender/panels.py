@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hands import click, corner, in_window, picture, run, until, viewport, xdotool
+from hands import click, corner, engine_module, in_window, picture, run, until, viewport, xdotool
 
 ROW = 23  # pixels of a menu's row
 
@@ -93,10 +93,7 @@ def preferences(area):
 
 
 def pictures_shown():
-    from importlib import import_module
-
-    found = import_module(next(name for name in sys.modules if name.endswith("gi_engine.viewport")))
-    return [view.refiner.picture for view in list(found._open) if view.refiner.picture]
+    return [view.refiner.picture for view in list(engine_module("viewport")._open) if view.refiner.picture]
 
 
 def rendered(samples):

@@ -10,14 +10,13 @@ import statistics
 import sys
 import tempfile
 import time
-from importlib import import_module
 from pathlib import Path
 
 import bpy
 from mathutils import Euler
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hands import ESCAPE, F12, Ticks, in_window, memory, press, renders, run, until, viewport
+from hands import ESCAPE, F12, Ticks, engine_module, in_window, memory, press, renders, run, until, viewport
 
 given = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
 TIMES = int(given[0]) if given else 10
@@ -76,10 +75,6 @@ def f12_and_esc(number):
         end = time.monotonic() + 20
         while renders() and time.monotonic() < end:
             yield 0.02
-
-
-def engine_module(name):
-    return import_module(next(found for found in sys.modules if found.endswith(f"gi_engine.{name}")))
 
 
 def shown():

@@ -5,6 +5,9 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <map>
+#include <optional>
+
 #include "bind/read_scene.h"
 #include "core/check.h"
 
@@ -13,10 +16,28 @@ namespace nb = nanobind;
 namespace gi::bind {
 namespace {
 
+// The end of a scene or a session frees much memory, and may wait for threads: Python's others go on meanwhile.
 struct BoundScene {
   std::unique_ptr<const LitScene> scene;
   std::vector<std::string> warnings;
   std::vector<nb::object> meshes;  // of a movable scene: what each was read from, held so that it is not taken for another
+
+  BoundScene() = default;
+  BoundScene(BoundScene&&) = default;
+  ~BoundScene() {
+    if (!scene) return;
+    const nb::gil_scoped_release release;
+    scene.reset();
+  }
+};
+
+struct EndsWithoutGil {
+  std::optional<nb::gil_scoped_release> release;
+};
+
+struct BoundSession : private EndsWithoutGil, Session {  // bases end in the opposite order
+  using Session::Session;
+  ~BoundSession() { release.emplace(); }
 };
 
 BoundScene* make_scene(nb::handle data, const std::string& embree, int threads, bool movable, const BoundScene* before) {
@@ -61,7 +82,7 @@ nb::ndarray<nb::numpy, float> emission_seen(const BoundScene& bound, nb::handle 
   return nb::ndarray<nb::numpy, float>(pixels->data(), {height, width, 3}, owner);
 }
 
-nb::dict progress_dict(const Session& session) {
+nb::dict progress_dict(const BoundSession& session) {
   Progress p;
   {
     const nb::gil_scoped_release release;
@@ -85,7 +106,7 @@ nb::dict progress_dict(const Session& session) {
   return d;
 }
 
-nb::ndarray<nb::numpy, float> read_pass(const Session& session, const std::string& pass) {
+nb::ndarray<nb::numpy, float> read_pass(const BoundSession& session, const std::string& pass) {
   const FilmSpec& spec = session.film().spec();
   const int channels = session.film().channels(pass);
   require(channels > 0, "there is no pass named '" + pass + "'");
@@ -99,7 +120,7 @@ nb::ndarray<nb::numpy, float> read_pass(const Session& session, const std::strin
   return nb::ndarray<nb::numpy, float>(pixels->data(), {h, w, c}, owner);
 }
 
-nb::ndarray<nb::numpy, float> coverage(const Session& session) {
+nb::ndarray<nb::numpy, float> coverage(const BoundSession& session) {
   require(session.lightmap(), "the session is not a bake");
   const size_t h = size_t(session.film().spec().height), w = size_t(session.film().spec().width);
   auto* texels = new std::vector<float>(h * w);
@@ -108,21 +129,28 @@ nb::ndarray<nb::numpy, float> coverage(const Session& session) {
   return nb::ndarray<nb::numpy, float>(texels->data(), {h, w}, owner);
 }
 
-Kept read_kept(nb::dict tables) {
+void take_over(BoundSession& session, nb::dict tables) {
+  using Rows = nb::ndarray<const float, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
+  std::map<std::string, Rows> given;
+  for (auto [name, table] : tables) given[nb::cast<std::string>(name)] = nb::cast<Rows>(table);
+  const nb::gil_scoped_release release;
   Kept kept;
-  for (auto [name, table] : tables) {
-    const auto rows = nb::cast<nb::ndarray<const float, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>>(table);
-    kept[nb::cast<std::string>(name)] = {rows.shape(1), std::vector<float>(rows.data(), rows.data() + rows.size())};
-  }
-  return kept;
+  for (const auto& [name, rows] : given) kept[name] = {rows.shape(1), std::vector<float>(rows.data(), rows.data() + rows.size())};
+  session.take_over(kept);
 }
 
-nb::dict kept_tables(const Session& session) {
+nb::dict kept_tables(const BoundSession& session) {
+  Kept kept;
+  {
+    const nb::gil_scoped_release release;
+    kept = session.kept();
+  }
   nb::dict tables;
-  for (auto& [name, table] : session.kept()) {
-    auto* numbers = new std::vector<float>(table.numbers);
+  for (auto& [name, table] : kept) {
+    const size_t rows = table.rows();
+    auto* numbers = new std::vector<float>(std::move(table.numbers));
     nb::capsule owner(numbers, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
-    tables[name.c_str()] = nb::ndarray<nb::numpy, float>(numbers->data(), {table.rows(), table.columns}, owner);
+    tables[name.c_str()] = nb::ndarray<nb::numpy, float>(numbers->data(), {rows, table.columns}, owner);
   }
   return tables;
 }
@@ -198,20 +226,24 @@ void bind_render(nb::module_& m) {
           },
           nb::arg("rays"), "Distances (n,) along rays (n, 6: origin, unit direction); infinite where nothing is hit.");
 
-  nb::class_<Session>(m, "Session", "One render in the background.")
+  nb::class_<BoundSession>(m, "Session", "One render in the background.")
       .def(
           "__init__",
-          [](Session* self, const BoundScene& scene, nb::handle camera, nb::handle film, nb::handle settings, nb::handle lightmap) {
-            new (self) Session(*scene.scene, read_camera(camera), read_film(film), read_settings(settings), read_lightmap(lightmap));
+          [](BoundSession* self, const BoundScene& scene, nb::handle camera, nb::handle film, nb::handle settings, nb::handle lightmap) {
+            const Camera eye = read_camera(camera);
+            FilmSpec spec = read_film(film);
+            RenderSettings wishes = read_settings(settings);
+            const std::optional<LightmapSpec> bake = read_lightmap(lightmap);
+            const nb::gil_scoped_release release;
+            new (self) BoundSession(*scene.scene, eye, std::move(spec), std::move(wishes), bake);
           },
           nb::arg("scene"), nb::arg("camera"), nb::arg("film"), nb::arg("settings"), nb::arg("lightmap") = nb::none(),
           nb::keep_alive<1, 2>(), "Takes scene_data's Camera, Film, Settings and, for a bake, Lightmap. Raises ValueError for bad input.")
-      .def(
-          "take_over", [](Session& s, nb::dict tables) { s.take_over(read_kept(tables)); }, nb::arg("tables"),
-          "Before the start: what kept() of a render by the same integrator was. Raises ValueError.")
+      .def("take_over", &take_over, nb::arg("tables"),
+           "Before the start: what kept() of a render by the same integrator was. Raises ValueError.")
       .def(
           "look_along",
-          [](Session& s, nb::list cameras) {
+          [](BoundSession& s, nb::list cameras) {
             std::vector<Camera> path;
             for (nb::handle camera : cameras) path.push_back(read_camera(camera));
             s.look_along(std::move(path));
@@ -219,19 +251,20 @@ void bind_render(nb::module_& m) {
           nb::arg("cameras"), "Before the start: where the camera will be in other frames.")
       .def("stay_steady", &Session::stay_steady, "Before the start: a frame among others; what it takes over is not made better.")
       .def(
-          "continue_from", &Session::continue_from, nb::arg("earlier"),
+          "continue_from", [](BoundSession& s, BoundSession& earlier) { s.continue_from(earlier); }, nb::arg("earlier"),
+          nb::call_guard<nb::gil_scoped_release>(),
           "Before the start: what an earlier session of the same scene, integrator and parameters has worked out, be it cancelled, serves\n"
           "on. It must have ended, and keeps nothing. Raises ValueError.")
       .def("kept", &kept_tables, "Once ended: what another render of the scene may take over, float32 tables (rows, columns) by name.")
-      .def("start", &Session::start)
+      .def("start", &Session::start, nb::call_guard<nb::gil_scoped_release>())
       .def("wait", &Session::wait, nb::arg("seconds"), nb::call_guard<nb::gil_scoped_release>(), "True once the render has ended.")
       .def("cancel", &Session::cancel)
       .def("progress", &progress_dict)
       .def(
-          "messages", [](const Session& s) { return s.log().texts(); }, "What the integrator has to say of the scene, for the user.")
+          "messages", [](const BoundSession& s) { return s.log().texts(); }, "What the integrator has to say of the scene, for the user.")
       .def(
           "figures",
-          [](const Session& s) {
+          [](const BoundSession& s) {
             nb::dict d;
             for (const auto& [name, value] : s.log().figures()) d[name.c_str()] = value;
             return d;

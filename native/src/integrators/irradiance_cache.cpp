@@ -70,6 +70,7 @@ class IrradianceCacheIntegrator final : public Integrator {
 
   void take_over(const Kept& kept) override { records_.take_over(kept); }
   Kept keep() const override { return records_.keep(); }
+  void continue_from(Integrator& earlier) override { records_.continue_from(static_cast<IrradianceCacheIntegrator&>(earlier).records_); }
 
  private:
   void trace(const RenderContext& context, const Film& film, const CameraRay& camera, Walk& walk, Sampler& sampler,

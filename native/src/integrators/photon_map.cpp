@@ -190,7 +190,7 @@ class PhotonMapIntegrator final : public Integrator {
     continues_ = true;
     if (!has_all_photons()) return;
     irradiance_ = std::move(earlier.irradiance_);
-    if (const Kept records = earlier.records_.keep(); !records.empty()) records_.take_over(records);
+    records_.continue_from(earlier.records_);
   }
 
  private:

@@ -213,6 +213,7 @@ void IrradianceCache::refer(uint32_t index, Vec3 low, float side, uint32_t recor
 }
 
 void IrradianceCache::freeze() {
+  if (is_frozen_) return;
   // Radii have shrunk since the first records went in: a new tree refers to each from fewer nodes.
   nodes_.assign(1, Node());
   links_.clear();

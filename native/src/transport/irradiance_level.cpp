@@ -116,6 +116,11 @@ void IrradianceLevel::check(const std::vector<float>& rows, const std::string& n
   }
 }
 
+void IrradianceLevel::begin_anew() {
+  smoothing_ = {};  // it may have been stopped before it knew all neighbours
+  for (Growth& g : growth_) g.changed = 0, g.seen = {};
+}
+
 void IrradianceLevel::take_over(const std::vector<float>& rows, bool fixed) {
   for (size_t begin = 0; begin < rows.size(); begin += kColumns) {
     const IrradianceRecord r = IrradianceRecord::read(&rows[begin]);

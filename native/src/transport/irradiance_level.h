@@ -47,6 +47,8 @@ class IrradianceLevel {
   // Throws InputError naming the row that is none. `fixed`: nothing is to improve them.
   void take_over(const std::vector<float>& rows, bool fixed);
   static void check(const std::vector<float>& rows, const std::string& name);
+  // Goes on in another render, whose passes are counted from 0.
+  void begin_anew();
 
  private:
   static constexpr double kImproved = 1.0 / 16.0;  // of all gathers

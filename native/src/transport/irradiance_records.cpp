@@ -70,6 +70,14 @@ void IrradianceRecords::take_over(const Kept& kept) {
   }
 }
 
+void IrradianceRecords::continue_from(IrradianceRecords& earlier) {
+  levels_ = std::move(earlier.levels_);
+  taken_over_ = std::move(earlier.taken_over_);
+  gathered_ = earlier.gathered_, refined_ = earlier.refined_;
+  earlier.levels_.clear(), earlier.taken_over_.clear();
+  for (IrradianceLevel& level : levels_) level.begin_anew();
+}
+
 size_t IrradianceRecords::size() const {
   size_t count = 0;
   for (const IrradianceLevel& level : levels_) count += level.size();
@@ -78,7 +86,7 @@ size_t IrradianceRecords::size() const {
 
 void IrradianceRecords::before_pass(const RenderContext& context, const Film& film, int pass, const Follow& follow) {
   const Work work{context, film, follow};
-  if (levels_.empty())
+  if (!is_open_)
     play_overture(work);
   else
     refine(work, pass);
@@ -99,15 +107,18 @@ void IrradianceRecords::after_pass(const RenderContext& context, int pass) {
 
 void IrradianceRecords::play_overture(const Work& work) {
   const RenderContext& context = work.context;
-  for (int level = 0; level < std::max(level_count(), 1); ++level) {
-    levels_.emplace_back(context.scene.bounds(), error_at(level), s_.spacing, s_.smoothing);
-    if (!taken_over_.empty()) levels_.back().take_over(taken_over_[size_t(level)], context.steady);
+  is_open_ = true;
+  if (levels_.empty()) {
+    for (int level = 0; level < std::max(level_count(), 1); ++level) {
+      levels_.emplace_back(context.scene.bounds(), error_at(level), s_.spacing, s_.smoothing);
+      if (!taken_over_.empty()) levels_.back().take_over(taken_over_[size_t(level)], context.steady);
+    }
+    for (const IrradianceLevel& level : levels_) gathered_ += uint32_t(level.gathers());  // rays of their own for those to come
+    if (size() > 0) slack_ = kSlack;
   }
   taken_over_.clear();
   const size_t before = size();
-  for (const IrradianceLevel& level : levels_) gathered_ += uint32_t(level.gathers());  // rays of their own for those to come
   const uint32_t gathered_before = gathered_;
-  if (before > 0) slack_ = kSlack;
   // Deepest first: records of a level are made with the help of those below.
   for (int level = level_count() - 1; level >= 0 && !context.cancelled; --level) {
     const double seconds = context.seconds(), left = std::max(kOvertureShare * context.time_limit - seconds, 0.0);

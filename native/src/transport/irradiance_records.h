@@ -46,7 +46,9 @@ class IrradianceRecords {
 
   size_t size() const;
   void take_over(const Kept& kept);  // before the first pass
-  bool takes_over() const { return !taken_over_.empty(); }
+  // The same, of a render of the same scene and settings, which may have been stopped anywhere and is not used any more.
+  void continue_from(IrradianceRecords& earlier);
+  bool takes_over() const { return !taken_over_.empty() || !levels_.empty(); }  // asked before the first pass
   Kept keep() const;
 
  private:
@@ -80,6 +82,7 @@ class IrradianceRecords {
 
   IrradianceRecordsSettings s_;
   std::vector<IrradianceLevel> levels_;
+  bool is_open_ = false;  // the overture has been played
   mutable Tally hits_, misses_;                 // of the first bounce, while the picture is made
   uint32_t gathered_ = 0;                       // records, those included that were not needed in the end
   std::vector<std::vector<float>> taken_over_;  // rows, by level
