@@ -115,7 +115,8 @@ class Sync:
         Raises ExportError."""
         changes, frame = changes_of(depsgraph), frame_of(depsgraph)
         before, frame_is_new = self.exported, frame != self._frame
-        shown = shown_objects(depsgraph, view)
+        may_hide = changes & {"settings", "objects"} or self.is_stale(depsgraph, view) or any(self._local)
+        shown = shown_objects(depsgraph, view) if may_hide else self._shown
         same_frame = before and not frame_is_new and shown == self._shown
         stands = same_frame and not self.known.programs.look_elsewhere
         self._local, self._shown = local_of(view), shown
@@ -210,8 +211,8 @@ class Sync:
             if prototype is None or look_of(prototype) != known.looks[at]:
                 return None
             if update.is_updated_geometry:
-                if users[instance.mesh] > 1 or not prototype.is_plain:
-                    return None
+                if users[instance.mesh] > 1 or item.original.data.users > 1 or not prototype.is_plain:
+                    return None  # of an edit mode that ends, too: only then is it the others' mesh again
                 bent.append((instance.mesh, prototype))
             matrix = np.array(item.matrix_world, np.float32)
             if not usable(matrix[None])[0]:

@@ -153,6 +153,32 @@ def test_objects_stay_in_blenders_order(watched):
     compare(watched.sync.exported, fresh(), "a lamp with a parent")
 
 
+def test_a_mesh_is_shared_again_after_edit_mode(watched):
+    """While one of two objects is edited, it has a mesh of its own."""
+    first = objects("MESH")[0]
+    add(bpy.context.scene, "Twin", first.data)
+    watched.settle()
+    bpy.context.view_layer.objects.active = first
+    for mode in ("EDIT", "OBJECT"):
+        bpy.ops.object.mode_set(mode=mode)
+        watched.settle()
+        bpy.context.view_layer.update()
+        compare(watched.sync.exported, fresh(), mode)
+    assert len(watched.sync.exported.scene.meshes) == 1
+
+
+def test_what_is_hidden_goes_and_comes_back(watched):
+    """Of which Blender says no more than that something of the scene has changed."""
+    item = objects("MESH")[0]
+    add(bpy.context.scene, "Other", mesh())
+    watched.settle()
+    for hidden, count in ((True, 1), (False, 2)):
+        item.hide_set(hidden)
+        watched.settle()
+        compare(watched.sync.exported, fresh(), f"hidden: {hidden}")
+        assert len(watched.sync.exported.scene.instances) == count
+
+
 def drive(watched, seed: int, rounds: int) -> int:
     """Every kind of edit once a round, in any order, now and then three at a time. How many that were."""
     rng, number = random.Random(seed), 0

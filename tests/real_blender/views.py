@@ -17,7 +17,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 from hands import Ticks, engine_module, in_window, picture, run, until
 
 SETTLE = 120  # seconds, at most
-MOST_HELD = 1.0  # seconds for which the window may not answer, on a machine that does other things as well
 FRAMES = 24
 
 
@@ -120,32 +119,44 @@ def begins_anew_but_for_cause():
     print("views: begins anew only for a cause", flush=True)
 
 
+def played(frames):
+    """The gaps between ticks while an animation is played, until ten frames were shown; the frames go into the list."""
+    note = lambda scene, _: frames.append(scene.frame_current)  # noqa: E731
+    bpy.app.handlers.frame_change_post.append(note)
+    ticks = Ticks()
+    with in_window("VIEW_3D"):
+        bpy.ops.screen.animation_play()
+    yield from until(lambda: len(set(frames)) > 10, 60, "frames of the animation")
+    yield 2
+    with in_window("VIEW_3D"):
+        bpy.ops.screen.animation_cancel(restore_frame=False)
+    bpy.app.handlers.frame_change_post.remove(note)
+    print(f"views: playback, {views() and 'rendered' or 'solid'}: {len(frames)} frames, {ticks.end()}", flush=True)
+    return ticks
+
+
 def play():
-    """The window goes on answering, pictures come meanwhile, and the last frame's is right."""
+    """The window goes on answering as it does in Solid shading, pictures come meanwhile, and the last frame's is right."""
     item, scene = meshes()[0], bpy.context.scene
     scene.frame_start, scene.frame_end = 1, FRAMES
     for frame, x in ((1, 0.0), (FRAMES, 0.4)):
         item.location.x = x
         item.keyframe_insert("location", frame=frame)
+    space = views()[0].spaces.active
+    space.shading.type = "SOLID"
+    yield 1
+    plain = yield from played([])
     scene.frame_set(1)
+    space.shading.type = "RENDERED"
     yield from settled("frame 1")
     (view,) = ours()
     before, shown, tell = pixels(), [], view.refiner.redraw
     view.refiner.redraw = lambda: shown.append(view.refiner.picture) or tell()
-    frames = []
-    bpy.app.handlers.frame_change_post.append(note := lambda scene, _: frames.append(scene.frame_current))
-    ticks = Ticks()
-    with in_window("VIEW_3D"):
-        bpy.ops.screen.animation_play()
-    yield 6
-    with in_window("VIEW_3D"):
-        bpy.ops.screen.animation_cancel(restore_frame=False)
-    words = ticks.end()
-    bpy.app.handlers.frame_change_post.remove(note)
+    ticks = yield from played([])
     pictures = len({id(p) for p in shown if p})
-    print(f"views: playback: {len(frames)} frames, {pictures} pictures, {words}", flush=True)
-    assert len(set(frames)) > 5 and pictures > 5
-    assert max(ticks.gaps) < MOST_HELD, f"the window did not answer for {max(ticks.gaps):.2f} s: {ticks.where}"
+    print(f"views: playback: {pictures} pictures", flush=True)
+    assert pictures > 5
+    assert max(ticks.gaps) < 2 * max(plain.gaps) + 0.5, f"the window did not answer: {ticks.where}"
     if scene.frame_current == 1:
         scene.frame_set(FRAMES // 2)
     yield from as_if_opened_afresh(f"frame {scene.frame_current}")
