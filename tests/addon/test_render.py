@@ -393,3 +393,27 @@ def test_material_previews_show_the_material(scene):
         colors.append(pixels[size[1] // 2 - 5 : size[1] // 2 + 5, size[0] // 2 - 5 : size[0] // 2 + 5, :3].mean((0, 1)))
     red, blue = colors
     assert red[0] > 2 * red[2] and blue[2] > 2 * blue[0]
+
+
+def test_scene_strips_are_rendered(scene, tmp_path):
+    """A strip of the sequencer that shows another scene holds what that scene's own render does."""
+    add(scene, "Square", mesh(), scale=(3, 3, 3), location=(-1.5, -1.5, 0))
+    add(scene, "Lamp", bpy.data.lights.new("Lamp", "POINT"), location=(1, 0, 2)).data.energy = 100
+    outer = bpy.data.scenes.new("Outer")
+    outer.render.engine = "GI_ENGINE"
+    outer.render.resolution_x, outer.render.resolution_y = 16, 12
+    outer.render.resolution_percentage = 100
+    outer.frame_start = outer.frame_end = 1
+    editor = outer.sequence_editor_create()
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences
+    strips.new_scene("inner", scene, 1, 1)
+    pictures = []
+    for each in (scene, outer):
+        each.view_settings.view_transform = "Standard"
+        each.render.image_settings.file_format = "PNG"
+        each.render.filepath = str(tmp_path / f"{each.name}.png")
+        bpy.ops.render.render(write_still=True, scene=each.name)
+        image = bpy.data.images.load(each.render.filepath)
+        pictures.append(np.array(image.pixels).reshape(12, 16, 4)[..., :3])
+    assert pictures[0].max() > 0.1
+    np.testing.assert_allclose(pictures[1], pictures[0], atol=1.5 / 255)

@@ -138,7 +138,7 @@ def turn_the_view():
         yield 0.5
         ours = timed(("draw", "update")) if shading == "RENDERED" else {}
         ticks = Ticks()
-        for number in range(TIMES):
+        for number in range(min(TIMES, 10)):
             choose(number)
             with in_window("VIEW_3D"):
                 region = bpy.context.region_data
