@@ -14,7 +14,7 @@ import numpy as np
 
 from . import caches, control, log, native, viewport
 from .bake import BakeError, bake_for_blender, blender_folders
-from .denoise import denoise
+from .denoise import Stopped, denoise
 from .display import duration
 from .export import Exported, ExportError, export
 from .keeping import Keeping, KeepingError, KeptFileError, keeps
@@ -209,7 +209,12 @@ class GIEngine(bpy.types.RenderEngine):
         self.update_stats("", "Denoising")
         guides = {guide: session.read(name) for guide, name in wishes.guides.items()}
         try:
-            clean = denoise(session.read("Combined"), guides, blender_folders(), wishes.quality, wishes.prefilter)
+            was_stopped = self.stopped()  # what is finished is denoised all the same
+            picture, folders = session.read("Combined"), blender_folders()
+            stopped = lambda: not was_stopped and self.stopped()  # noqa: E731
+            clean = denoise(picture, guides, folders, wishes.quality, wishes.prefilter, stopped)
+        except Stopped:
+            return
         except RuntimeError as error:
             self.warn(f"{error}; the picture stays as it is")
             return

@@ -3,7 +3,6 @@ asked for. No bpy; knows nothing of windows."""
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import os
 import threading
@@ -13,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import native
-from .denoise import denoise
+from . import log, native
+from .cleaner import Cleaner
+from .denoise import Stopped, denoise, load
 from .look import reduced
 from .scene_data import Camera, Film, Scene, Settings
 from .session import RenderFailed, Session
@@ -54,6 +54,7 @@ class Picture:
     samples: int
     seconds: float
     job: Job
+    clean: bool = False  # denoised
 
 
 class Refiner:
@@ -72,6 +73,8 @@ class Refiner:
         self._wake = threading.Condition()
         self._built: tuple | None = None  # the Scene, and what the native side made of it
         self._last: Session | None = None  # which knows of light in the scene, by caches and photons
+        self._job: Job | None = None  # at work
+        self._cleaner = Cleaner()
         self._first = FirstPicture()
         self._patience = PATIENCE
         _running.add(self)
@@ -96,6 +99,7 @@ class Refiner:
         try:
             self._work()
         finally:
+            self._cleaner.wait()
             self._forget()
             _running.discard(self)
 
@@ -105,6 +109,7 @@ class Refiner:
                 while self._wish is None and not self._closed:
                     self._wake.wait()
                 job, self._wish = self._wish, None
+                self._job = job
             if job is None or job.paused:
                 continue
             try:
@@ -197,17 +202,37 @@ class Refiner:
         return last if alike else None
 
     def _publish(self, session: Session, job: Job, samples: int, seconds: float, clean: bool) -> None:
-        pixels = session.read(job.shown)
-        wishes = job.settings.denoising
-        if wishes and job.shown == "Combined" and clean:
+        wishes = job.settings.denoising if job.shown == "Combined" else None
+        picture = Picture(rgba(session.read(job.shown)), job.film.region, samples, seconds, job)
+        self.lacks_denoiser = bool(wishes) and load(self.denoiser) is None
+        if wishes and clean and not self.lacks_denoiser:
             guides = {guide: session.read(name) for guide, name in wishes.guides.items()}
-            with contextlib.suppress(RuntimeError):
-                found = denoise(pixels, guides, self.denoiser, wishes.quality, wishes.prefilter)
-                self.lacks_denoiser = found is None
-                pixels = pixels if found is None else found
-        elif wishes and job.shown == "Combined" and samples > job.start_sample:
-            return  # the last clean picture is better than a newer noisy one
-        self.picture = Picture(rgba(pixels), job.film.region, samples, seconds, job)
+            self._cleaner.submit(lambda: self._clean(picture, guides))
+        if self.picture and self.picture.job is job and self.picture.clean:
+            return  # better than a newer noisy one
+        self._show(picture)
+
+    def _clean(self, noisy: Picture, guides: dict[str, np.ndarray]) -> None:
+        """In the cleaner's thread."""
+        wishes = noisy.job.settings.denoising
+        try:
+            stopped = lambda: not self._is_current(noisy.job)  # noqa: E731
+            found = denoise(noisy.pixels, guides, self.denoiser, wishes.quality, wishes.prefilter, stopped)
+        except Stopped:
+            return
+        except RuntimeError as error:
+            log.logger.warning("%s; the viewport's picture stays noisy", error)
+            return
+        self._show(dataclasses.replace(noisy, pixels=rgba(found), clean=True))
+
+    def _is_current(self, job: Job) -> bool:
+        return self._job is job and not self._outdated()
+
+    def _show(self, picture: Picture) -> None:
+        with self._wake:
+            if picture.clean and not self._is_current(picture.job):
+                return
+            self.picture = picture
         self._tell()
 
 

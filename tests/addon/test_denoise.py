@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from gi_engine import engine
+from gi_engine.bake import blender_folders
+from gi_engine.denoise import Stopped, denoise
 
 from .conftest import add, mesh
 
@@ -44,3 +46,16 @@ def test_without_the_library_it_warns_and_leaves_the_picture(noisy, rendered, mo
     found = rendered(noisy)
     assert np.array_equal(found["ViewLayer.Combined"], found["ViewLayer.Noisy Image"])
     assert said == ["this Blender brings no denoiser: the picture stays as it is"]
+
+
+def test_it_can_be_stopped():
+    """Soon, not only before it begins."""
+    pixels = np.random.default_rng(1).random((256, 256, 4)).astype(np.float32)
+    asked = []
+    assert denoise(pixels, {}, blender_folders(), stopped=lambda: asked.append(1) or False).shape == pixels.shape
+    assert len(asked) > 3
+    for last in (1, len(asked) // 2):
+        again = []
+        with pytest.raises(Stopped):
+            denoise(pixels, {}, blender_folders(), stopped=lambda a=again, n=last: a.append(1) or len(a) >= n)
+        assert len(again) < len(asked)

@@ -298,6 +298,36 @@ def test_the_header_says_that_there_is_no_denoiser(job):
     shown.close()
 
 
+@pytest.mark.parametrize("ends", ["camera", "close"])
+def test_nothing_waits_for_the_denoiser(job, monkeypatch, ends):
+    """A camera's move is shown while it is at work; of what is out of date, nothing is shown."""
+    asked, found = [], np.full((200, 320, 4), 7, np.float32)
+
+    def slow(pixels, guides, folders, quality, prefilter, stopped):
+        asked.append(pixels.shape)
+        end = time.monotonic() + 60
+        while len(asked) == 1 and time.monotonic() < end:
+            if stopped():
+                raise refine.Stopped
+            time.sleep(0.01)
+        return found
+
+    monkeypatch.setattr(refine, "denoise", slow)
+    monkeypatch.setattr(refine, "load", lambda folders: True)
+    job.settings.denoising = Denoising("NONE", "FAST", "FAST")
+    refiner = Refiner(lambda: True)
+    refiner.show(job)
+    wait_for(lambda: asked and refiner.picture.samples == 3)
+    assert not refiner.picture.clean
+    if ends == "camera":
+        moved = turned(job, 5)
+        refiner.show(moved)
+        wait_for(lambda: refiner.picture.job is moved and refiner.picture.clean)
+        assert np.array_equal(refiner.picture.pixels, found) and asked[-1] == (200, 320, 4)
+    refiner.close()
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("GI Engine")]
+
+
 def test_the_same_job_is_not_begun_again(job):
     again = dataclasses.replace(job, camera=dataclasses.replace(job.camera, matrix=job.camera.matrix.copy()))
     assert viewport.same_job(again, job)

@@ -327,7 +327,10 @@ def denoised():
     (view,) = ours()
     scene.gi_engine.use_preview_denoising = True
     yield from until(lambda: view.job.settings.denoising, 20, "denoising asked for")
-    yield from settled("denoised")
+    yield from settled("asked to be denoised")
+    if os.environ.get("DENOISER"):
+        yield from until(lambda: view.refiner.picture.clean, SETTLE, "denoised")
+        yield 1
     words = view.status(view.refiner.picture)
     picture("denoised", views()[0])
     if os.environ.get("DENOISER"):
