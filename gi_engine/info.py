@@ -59,7 +59,7 @@ def limits(settings: Settings) -> str:
 
 
 def triangles(scene: Scene) -> str:
-    sizes = [mesh.triangle_count for mesh in scene.meshes]
+    sizes = [getattr(mesh, "triangle_count", 0) for mesh in scene.meshes]
     placed = sum(sizes[instance.mesh] * instance.count for instance in scene.instances)
     return f"triangles: {sum(sizes):,} stored, {placed:,} placed"
 

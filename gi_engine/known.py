@@ -72,7 +72,11 @@ class KnownMeshes(Known):
         mesh, owner = prototype.mesh, prototype.object.original
         data = owner.data.session_uid if owner.data else 0
         key = mesh.as_pointer()
-        size = (len(mesh.vertices), len(mesh.polygons), len(mesh.loops), mesh.name)
+        size = (
+            (prototype.style,)
+            if prototype.style
+            else (len(mesh.vertices), len(mesh.polygons), len(mesh.loops), mesh.name)
+        )
         wish = KnownMesh(frozenset(wanted), prototype.is_deformed, size, owner.session_uid, None)
         found = self.known.get(key)
         fresh = {owner.session_uid, data, prototype.parent.original.session_uid} & self.changed

@@ -47,6 +47,24 @@ class Mesh:
 
 
 @dataclass
+class Strands:
+    """Curves, as hair is, or points: what stands among Scene.meshes where there are no triangles. An attribute of domain FACE is one of
+    whole curves."""
+
+    name: str
+    # RIBBON (turned to whoever sees it, shaded as if round), THICK (a round spline), THICK_LINEAR (round, straight between
+    # its points) or SPHERE (points)
+    shape: str
+    positions: np.ndarray  # (K, 3) float32, object space
+    radius: np.ndarray  # (K,) float32
+    first_vertex: np.ndarray | None  # (S + 1,) int32: where each curve begins, and K; None for points
+    subdivisions: int  # of ribbons: a segment is cut into 2**n + 1 straight pieces, 17 at the most
+    attributes: list[Attribute] = field(default_factory=list)
+    active_uv: str = ""
+    texture_space: tuple = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+
+
+@dataclass
 class Instance:
     """A mesh in one place, or in n places that differ by nothing but matrix and random."""
 
@@ -199,7 +217,7 @@ class Lightmap:
 
 @dataclass
 class Scene:
-    meshes: list[Mesh] = field(default_factory=list)
+    meshes: list[Mesh | Strands] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     programs: list[Program] = field(default_factory=list)

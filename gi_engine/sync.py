@@ -17,6 +17,7 @@ from .export.images import release_scratch
 from .export.objects import Walk, usable
 from .export.settings import export_settings, resolve
 from .export.shaders import Shaders
+from .export.strands import curve_style
 from .export.warnings import Warnings
 from .known import Changed, KnownScene
 from .sameness import same_scene
@@ -153,7 +154,7 @@ class Sync:
         walked, found.walked = found.walked, None
         prototypes = walked.found.prototypes
         self._objects = Objects(
-            {} if any(p.randoms for p in prototypes) else {uid_of(p.object): k for k, p in enumerate(prototypes)},
+            {} if any(p.randoms for p in prototypes) else alone(prototypes),
             [look_of(p) for p in prototypes],
             [[uid_of(material) for material in p.materials] for p in walked.found.prototypes],
             walked.instances or [None] * len(walked.found.prototypes),
@@ -248,6 +249,12 @@ class Sync:
         return export_settings(depsgraph.scene_eval, depsgraph.view_layer_eval, native.integrators())
 
 
+def alone(prototypes) -> dict[int, int]:
+    """Of the objects that are one prototype, not a mesh and its hair: which."""
+    count = Counter(uid_of(p.object) for p in prototypes)
+    return {uid_of(p.object): k for k, p in enumerate(prototypes) if count[uid_of(p.object)] == 1}
+
+
 def look_of(prototype) -> tuple:
     settings = {
         f.name: getattr(prototype, f.name)
@@ -291,4 +298,5 @@ def frame_of(depsgraph) -> tuple:
     render = scene.render
     overrides = uid_of(layer.material_override), uid_of(getattr(layer, "world_override", None)), uid_of(scene.world)
     frame = scene.frame_current, scene.frame_subframe, render.use_simplify, render.simplify_subdivision
-    return (uid_of(scene), layer.name, *frame, *overrides, layer.use_sky, layer.use_solid)
+    shown = layer.use_sky, layer.use_solid, layer.use_strand
+    return (uid_of(scene), layer.name, *frame, *overrides, *shown, curve_style(scene, True))

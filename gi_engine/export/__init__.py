@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .. import approximations
-from ..scene_data import Camera, Instance, Scene, Settings
+from ..scene_data import Camera, Instance, Scene, Settings, Strands
 from .camera import export_camera
 from .film import export_film, frame_size
 from .images import release_scratch
@@ -20,6 +20,7 @@ from .objects import Collected, collect, place
 from .places import read_places
 from .settings import export_settings, resolve, unheeded
 from .shaders import Shaders
+from .strands import export_strands
 from .warnings import Warnings
 from .world import export_world
 
@@ -28,6 +29,7 @@ WITHOUT = {
     "subsurface": "does not follow light below surfaces: subsurface scattering is diffuse of the same albedo",
     "volumes": "does not render volumes that scatter or glow: they are left out",
     "absorption": "does not render volumes: they are left out",
+    "strands": "leaves out light that hair and points scatter on to other surfaces, in part at least",
     "portals": "sends no light through ray portals: they only show what lies behind them",
 }
 
@@ -120,6 +122,9 @@ def warn_of_needs(out: Scene, chosen: dict, warnings: Warnings) -> None:
         for need in program.needs:
             if need not in chosen["carries"]:
                 warnings.add(f"{chosen['label']} {WITHOUT[need]}", program.name)
+    if "strands" not in chosen["carries"]:
+        for name in dict.fromkeys(i.name for i in out.instances if isinstance(out.meshes[i.mesh], Strands)):
+            warnings.add(f"{chosen['label']} {WITHOUT['strands']}", name)
 
 
 def export_active_camera(engine, depsgraph, width: int, height: int, warnings: Warnings):
@@ -176,9 +181,11 @@ def add_mesh(out: Scene, prototype, wanted: set[str], warnings: Warnings, known=
 
 
 def read_mesh(prototype, wanted: set[str], known=None):
-    """None where there are no faces."""
+    """None where there are no faces, or no strands."""
 
     def read():
+        if prototype.style:
+            return export_strands(prototype.mesh, prototype.name, wanted, prototype.style)
         with readable(prototype.object, prototype.mesh) as mesh:
             return export_mesh(mesh, prototype.name, wanted, prototype.is_deformed)
 

@@ -1,7 +1,7 @@
 """Walks the depsgraph's instances: what is drawn, where, with which materials, seen by which rays.
 
-Curves, text, surfaces and metaballs reach us as the meshes that Blender makes of them. Strands, point clouds and
-volumes are left out, under a warning.
+Curves, text, surfaces and metaballs reach us as the meshes that Blender makes of them. Hair and point clouds go by the same ways as
+meshes. Volume grids are left out, under a warning.
 """
 
 from __future__ import annotations
@@ -24,11 +24,13 @@ from ..scene_data import (
     Instance,
 )
 from .ids import MASK, random_of_name
+from .strands import CurveStyle, ParticleHair, curve_style, particle_hair
 from .warnings import Warnings
 
 MATRIX_BYTES = 64
 MATRICES_ARE_BUFFERS = bpy.app.version >= (5, 0, 0)
-UNSUPPORTED = {"CURVES": "hair curves", "POINTCLOUD": "point clouds", "VOLUME": "volume grids"}
+UNSUPPORTED = {"VOLUME": "volume grids"}
+GEOMETRY = (bpy.types.Mesh, bpy.types.Curves, bpy.types.PointCloud)
 IGNORED = (bpy.types.Curve, bpy.types.MetaBall, bpy.types.Camera, bpy.types.Armature, bpy.types.Lattice)
 VISIBILITY = {
     "visible_camera": CAMERA,
@@ -50,7 +52,9 @@ class Prototype:
     """What all instances of one object (with one mesh, under one instancer) have in common."""
 
     name: str
-    mesh: object  # bpy Mesh; valid until the depsgraph is evaluated again
+    mesh: (
+        object  # bpy Mesh, Curves or PointCloud, or strands.ParticleHair; valid until the depsgraph is evaluated again
+    )
     materials: list  # bpy Material or None, by slot
     visibility: int
     color: tuple
@@ -61,6 +65,7 @@ class Prototype:
     object: object  # bpy Object that object attributes are read from
     parent: object  # bpy Object that instancer attributes are read from; the same where there is none
     is_plain: bool  # a mesh object of its own, with nothing that may take its faces away on purpose
+    style: CurveStyle | None  # of strands; None for meshes
     is_deformed: bool  # modifiers or shape keys may have moved its vertices
     matrices: bytearray | array = field(default_factory=new_matrices)
     randoms: list[int] = field(default_factory=list)  # Blender's number for each; empty where it is not an instance
@@ -77,7 +82,7 @@ class Collected:
 
 def collect(depsgraph, warnings: Warnings, view=None) -> Collected:
     """Goes through all instances once. Never leaves the loop early: older versions then leak the whole list."""
-    walk = Walk(depsgraph.view_layer_eval, warnings, view)
+    walk = Walk(depsgraph.view_layer_eval, warnings, view, depsgraph.mode == "RENDER")
     seen: dict[tuple, tuple] = {}
     # Data that gives nothing: that of empties, and of curves (which come as meshes, too).
     ignored: dict[int, object] = {id(None): None}
@@ -95,7 +100,7 @@ def collect(depsgraph, warnings: Warnings, view=None) -> Collected:
                 adders[1](instance.random_id)
         elif isinstance(data, IGNORED):
             ignored[id(data)] = data
-        elif instance.show_self:
+        elif instance.show_self or instance.show_particles:
             adders = walk.visit(instance) if walk.is_shown(instance) else ()
             if lasting is not None and adders is not None:
                 seen[key] = (adders, lasting, parent, data)
@@ -103,8 +108,9 @@ def collect(depsgraph, warnings: Warnings, view=None) -> Collected:
 
 
 class Walk:
-    def __init__(self, view_layer, warnings: Warnings, view=None):
+    def __init__(self, view_layer, warnings: Warnings, view=None, is_render: bool = True):
         self.view_layer = view_layer
+        self.style = curve_style(view_layer.id_data, is_render)
         self.view = view
         self.warnings = warnings
         self.found = Collected()
@@ -120,12 +126,14 @@ class Walk:
         item = instance.object
         # Duplicated objects are temporaries that Blender reuses; the object they were made from lasts.
         lasting, data = instance.instance_object, item.data
-        if isinstance(data, bpy.types.Mesh):
+        if isinstance(data, GEOMETRY):
+            pieces = list(self.pieces(instance, lasting or item))
             if lasting:
-                return self.visit_duplicate(instance, item, lasting, data)
-            prototype = self.add_prototype(item, item, item, data)
-            if prototype:
-                adder(prototype.matrices)(instance.matrix_world)
+                return together([self.visit_duplicate(instance, item, lasting, piece) for piece in pieces])
+            for piece in pieces:
+                prototype = self.add_prototype(item, item, item, piece)
+                if prototype:
+                    adder(prototype.matrices)(instance.matrix_world)
             return None
         if isinstance(data, bpy.types.Light):
             visibility = self.visibility(item, instance.parent if lasting else item)
@@ -136,6 +144,14 @@ class Walk:
         if item.type in UNSUPPORTED:
             self.warnings.add(f"{UNSUPPORTED[item.type]} are not supported yet; left out", item.name)
         return ()
+
+    def pieces(self, instance, owner):
+        """What an instance shows: its data, and the hair of its particles."""
+        data = instance.object.data
+        if instance.show_self and (self.view_layer.use_strand or not isinstance(data, bpy.types.Curves)):
+            yield data
+        if instance.show_particles and self.view_layer.use_strand and owner.particle_systems:
+            yield from particle_hair(owner, self.style.is_render)
 
     def visit_duplicate(self, instance, item, lasting, mesh) -> tuple:
         parent = instance.parent
@@ -157,6 +173,9 @@ class Walk:
         self.note_unsupported(item, parent)
         override = self.view_layer.material_override
         slots = [override if override else slot.material for slot in item.material_slots] or [override]
+        is_mesh = isinstance(mesh, bpy.types.Mesh)
+        if isinstance(mesh, ParticleHair):
+            slots = [slots[min(max(mesh.system.settings.material - 1, 0), len(slots) - 1)]]
         prototype = Prototype(
             name=item.name,
             mesh=mesh,
@@ -169,16 +188,14 @@ class Walk:
             shadow_terminator_geometry_offset=item.shadow_terminator_geometry_offset,
             object=lasting,
             parent=parent,
-            is_plain=lasting == parent and item.type == lasting.type and not lasting.modifiers,
+            is_plain=is_mesh and lasting == parent and item.type == lasting.type and not lasting.modifiers,
+            style=None if is_mesh else self.style,
             is_deformed=bool(lasting.modifiers) or has_shape_keys(lasting),
         )
         self.found.prototypes.append(prototype)
         return prototype
 
     def note_unsupported(self, item, parent) -> None:
-        for system in parent.particle_systems:
-            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
-                self.warnings.add("particle hair is not supported yet; left out", parent.name)
         if is_diced(parent, self.view_layer.id_data):
             self.warnings.add("adaptive subdivision is not supported yet; its fixed levels are rendered", parent.name)
         if item.is_shadow_catcher or parent.is_shadow_catcher:
@@ -213,6 +230,14 @@ def is_diced(item, scene) -> bool:
         return last.use_adaptive_subdivision
     experimental = getattr(getattr(scene, "cycles", None), "feature_set", "") == "EXPERIMENTAL"
     return experimental and getattr(getattr(item, "cycles", None), "use_adaptive_subdivision", False)
+
+
+def together(adders: list[tuple]) -> tuple:
+    """What takes the matrix and the number for all of them."""
+    taking = [pair for pair in adders if pair]
+    if len(taking) < 2:
+        return taking[0] if taking else ()
+    return tuple(lambda value, k=k: [pair[k](value) for pair in taking] for k in (0, 1))
 
 
 def has_shape_keys(item) -> bool:

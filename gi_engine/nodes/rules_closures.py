@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .program import Value
 from .rules import closure_rule
-from .rules_input import radial_tangent
+from .rules_input import surface_tangent
 
 NONE = (0.0, 0.0, 0.0)  # a normal or tangent that is not linked
 CUTOFF = 1e-5  # weights below this do not show, as in Cycles
@@ -36,7 +36,7 @@ def tangent(b, anisotropy: Value):
     n = number(b, anisotropy)
     if n is not None and abs(n) <= 1e-4:
         return NONE
-    return b.input("Tangent") if b.linked("Tangent") else radial_tangent(b)
+    return b.input("Tangent") if b.linked("Tangent") else surface_tangent(b)
 
 
 def film(b):

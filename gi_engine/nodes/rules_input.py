@@ -14,6 +14,9 @@ from .attributes import (
     PARTICLE_STATE,
     PARTICLE_VELOCITY,
     POINTINESS,
+    STRAND_INTERCEPT,
+    STRAND_LENGTH,
+    STRAND_RANDOM,
     UNDEFORMED,
     attribute_name,
 )
@@ -39,8 +42,13 @@ def generated(b):
     return b.op("generated", imm=(b.attribute(UNDEFORMED),))
 
 
+def surface_tangent(b):
+    """The default where a Tangent socket is not linked: around the object's Z, or along the strand."""
+    return b.op("along_strand", radial_tangent(b))
+
+
 def radial_tangent(b, axis: str = "Z"):
-    """The tangent around an axis of the object: the default where a Tangent socket is not linked."""
+    """The tangent around an axis of the object."""
     return b.op("tangent_radial", generated(b), imm=(AXES[axis],))
 
 
@@ -88,7 +96,7 @@ def geometry(b):
     }.items():
         b.output(name, b.op(op))
     if b.wants("Tangent"):
-        b.output("Tangent", radial_tangent(b))
+        b.output("Tangent", surface_tangent(b))
     for name, attribute in {"Pointiness": POINTINESS, "Random Per Island": ISLAND}.items():
         if b.wants(name):
             b.output(name, named(b, attribute)[1])
@@ -234,7 +242,7 @@ def raycast(b):
         b.output(socket.identifier, mean if socket.type in ("VALUE", "INT", "BOOLEAN") else vector)
 
 
-# -------------------------------------------------------------------- particles, and what meshes are not
+# -------------------------------------------------------------------- particles, curves, points
 
 
 @rule("ShaderNodeParticleInfo")
@@ -250,8 +258,34 @@ def particle_info(b):
     b.output("Angular Velocity", named(b, PARTICLE_SPIN)[0])
 
 
-@rule("ShaderNodeHairInfo", "ShaderNodePointInfo", "ShaderNodeVolumeInfo")
+@rule("ShaderNodeHairInfo")
+def curves_info(b):
+    """Zeros on meshes, as in Cycles."""
+    b.output("Is Strand", b.op("strand")[2])
+    for name, attribute in {
+        "Intercept": STRAND_INTERCEPT,
+        "Length": STRAND_LENGTH,
+        "Random": STRAND_RANDOM,
+    }.items():
+        if b.wants(name):
+            b.output(name, named(b, attribute)[1])
+    _, thickness, normal = b.op("strand_place")
+    b.output("Thickness", thickness)
+    b.output("Tangent Normal", normal)
+
+
+@rule("ShaderNodePointInfo")
+def point_info(b):
+    center, thickness, _ = b.op("strand_place")
+    is_point = b.op("math_subtract", b.constant(1.0), b.op("strand")[2])
+    b.output("Position", b.op("vector_scale", center, is_point))
+    b.output("Radius", b.op("math_multiply", thickness, b.op("math_multiply", is_point, b.constant(0.5))))
+    if b.wants("Random"):
+        b.output("Random", b.op("math_multiply", named(b, STRAND_RANDOM)[1], is_point))
+
+
+@rule("ShaderNodeVolumeInfo")
 def not_of_meshes(b):
-    """Zeros on meshes, as in Cycles; strands, points and volumes themselves are left out elsewhere, under a warning."""
+    """Zeros on meshes, as in Cycles; volume grids themselves are left out elsewhere, under a warning."""
     for socket in b.node.outputs:
         b.output(socket.identifier, b.constant(0.0))

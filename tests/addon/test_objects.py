@@ -255,10 +255,8 @@ def test_geometry_nodes_instances(scene, render_export):
 
 
 def test_objects_of_unsupported_kinds_are_named(scene, render_export):
-    add(scene, "Fur", bpy.data.hair_curves.new("Fur"))
     add(scene, "Cloud", bpy.data.volumes.new("Cloud"))
     messages = render_export().warnings
-    assert any('"Fur"' in m and "hair" in m for m in messages)
     assert any('"Cloud"' in m and "volume" in m for m in messages)
 
 
@@ -266,12 +264,9 @@ def test_what_objects_ask_for_in_vain_is_named(scene, render_export):
     add(scene, "Catcher", mesh(), is_shadow_catcher=True)
     lamp = add(scene, "Lamp", bpy.data.lights.new("Lamp", "POINT"))
     lamp.light_linking.receiver_collection = bpy.data.collections.new("Receivers")
-    hairy = add(scene, "Hairy", mesh())
-    hairy.modifiers.new("Hair", "PARTICLE_SYSTEM")
-    hairy.particle_systems[0].settings.type = "HAIR"
     scene.render.use_motion_blur = True
     messages = render_export().warnings
-    for words in (('"Catcher"', "shadow catcher"), ('"Lamp"', "light linking"), ('"Hairy"', "hair"), ("motion blur",)):
+    for words in (('"Catcher"', "shadow catcher"), ('"Lamp"', "light linking"), ("motion blur",)):
         assert any(all(word in message for word in words) for message in messages), words
 
 

@@ -23,6 +23,9 @@ FEATURES = {
     ),
     "Volumes that scatter or glow (else left out)": lambda d: "volumes" in d["carries"],
     "Ray portals (else they show what lies behind them, but let no light through)": lambda d: "portals" in d["carries"],
+    "Light that hair and points send on to other surfaces (else left out, in part at least)": lambda d: (
+        "strands" in d["carries"]
+    ),
     "Bakes lightmaps": lambda d: d["bakes"],
     "Keeps what it worked out over frames and in files": lambda d: d["kept_version"] > 0,
     "… and drops of it only what is near what moved": lambda d: d["kept_by_place"],

@@ -140,7 +140,35 @@ def absorbs_along_x(b):
     b.op("volume_coefficients", 1.0, amount, (0, 0, 0), (0, 0, 0), 0.0, 0.0, imm=(0,))
 
 
+def tuft(shape, fill, *lights):
+    """Thick hair that comes out of the floor, or points about it."""
+    rng = np.random.default_rng(3)
+    count, keys = 24, 1 if shape == "SPHERE" else 5
+    root, bend = rng.uniform(-0.6, 0.6, (count, 1, 3)), rng.normal(0, 0.25, (count, 1, 3))
+    t = np.linspace(0, 1, keys)[None, :, None]
+    positions = (
+        root * (1, 1, 0) - (0, 0, 1.1 if keys > 1 else 0.9) + t * (0, 0, 1.2) + bend * (t * t + (keys == 1))
+    ).reshape(-1, 3)
+    first = None if keys == 1 else np.arange(0, count * keys + 1, keys, dtype=np.int32)
+    radius = rng.uniform(0.05, 0.12, count * keys).astype(np.float32)
+    hair = sd.Strands("tuft", shape, np.ascontiguousarray(positions, np.float32), radius, first, 2)
+    return room((hair, program(fill) if callable(fill) else fill), lights=lights or (area(),))
+
+
+def fibre(b):
+    along, _, _, met = b.op("strand")
+    b.op("hair_chiang", 1.0, (0.3, 0.6, 1.0), 0.3, 0.4, 0.0, 0.03, 1.55, along, met)
+
+
 GREY = surface(0.5)
+STRANDS = {
+    "ribbons": lambda: tuft("RIBBON", GREY),
+    "tubes": lambda: tuft("THICK", GREY),
+    "straight tubes of fibre": lambda: tuft("THICK_LINEAR", fibre),
+    "ribbons of fibre": lambda: tuft("RIBBON", fibre, area(), point()),
+    "points": lambda: tuft("SPHERE", principled()),
+    "see-through ribbons": lambda: tuft("RIBBON", half_transparent),
+}
 SCENES = {
     "point lamp": lambda: ball(GREY, point(), flat=True),
     "smooth normals": lambda: ball(GREY, point()),

@@ -4,7 +4,7 @@ import functools
 
 import numpy as np
 import pytest
-from agreement_scenes import CAMERAS, CAUSTICS, SCENES, WIDE
+from agreement_scenes import CAMERAS, CAUSTICS, SCENES, STRANDS, WIDE
 from light_scenes import lamp, matrix
 
 from gi_engine import scene_data as sd
@@ -31,7 +31,7 @@ def measured(integrator, name, camera, samples, **parameters):
     """Means of blocks, and of the picture: (SEEDS, BLOCKS² · 3), (SEEDS,)."""
     found = []
     for seed in range(SEEDS):
-        scene = {**SCENES, **CAUSTICS, **WIDE}[name]()
+        scene = {**SCENES, **CAUSTICS, **WIDE, **STRANDS}[name]()
         scene.camera = CAMERAS[camera]()
         image = render(scene, integrator, samples, seed + 1, **parameters)
         size = len(image) // BLOCKS
@@ -53,6 +53,11 @@ def assert_agree(a, b):
 @pytest.mark.parametrize("name", [*SCENES, *CAUSTICS])
 def test_bidirectional_agrees_with_path_tracing(name):
     assert_agree(measured("path", name, "perspective", 16), measured("bdpt", name, "perspective", 8))
+
+
+@pytest.mark.parametrize("name", STRANDS)
+def test_light_bounces_off_strands_as_in_path_tracing(name):
+    assert_agree(measured("path", name, "perspective", 32), measured("bdpt", name, "perspective", 16))
 
 
 @pytest.mark.parametrize("connections", [1, 40])

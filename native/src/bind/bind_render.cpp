@@ -183,6 +183,7 @@ nb::list describe_integrators() {
     if (d.carries & kCarriesAbsorption) carries.append("absorption");
     if (d.carries & kCarriesVolumes) carries.append("volumes");
     if (d.carries & kCarriesPortals) carries.append("portals");
+    if (d.carries & kCarriesStrands) carries.append("strands");
     entry["carries"] = carries;
     all.append(entry);
   }

@@ -126,18 +126,8 @@ Domain read_domain(const Record& r, const char* field) {
   return r.choice<Domain>(field, {{"POINT", Domain::kPoint}, {"CORNER", Domain::kCorner}, {"FACE", Domain::kFace}});
 }
 
-MeshData read_mesh(const Record& r) {
-  MeshData m;
-  m.name = r.get<std::string>("name");
-  m.positions = padded_positions(r);
-  m.corner_vert = r.array<const int32_t>("corner_vert");
-  m.triangulated = r.at("tri_corner").is_none();
-  m.tri_corner = r.array<const int32_t>("tri_corner");
-  m.tri_face = r.array<const int32_t>("tri_face");
-  m.face_material = r.array<const int32_t>("face_material");
-  m.normals_domain = read_domain(r, "normals_domain");
-  m.normals = r.array<const float>("normals");
-  m.sharp_face = r.array<const uint8_t>("sharp_face");
+// Attributes, and what goes with them.
+void read_common(const Record& r, MeshData& m) {
   for (const Record& a : r.list("attributes", r.who + " attribute")) {
     AttributeData d;
     d.name = a.get<std::string>("name");
@@ -153,6 +143,37 @@ MeshData read_mesh(const Record& r) {
     m.texture_location[k] = float(nb::cast<double>(nb::float_(space[nb::int_(0)][nb::int_(k)])));
     m.texture_size[k] = float(nb::cast<double>(nb::float_(space[nb::int_(1)][nb::int_(k)])));
   }
+}
+
+MeshData read_mesh(const Record& r) {
+  MeshData m;
+  m.name = r.get<std::string>("name");
+  m.positions = padded_positions(r);
+  m.corner_vert = r.array<const int32_t>("corner_vert");
+  m.triangulated = r.at("tri_corner").is_none();
+  m.tri_corner = r.array<const int32_t>("tri_corner");
+  m.tri_face = r.array<const int32_t>("tri_face");
+  m.face_material = r.array<const int32_t>("face_material");
+  m.normals_domain = read_domain(r, "normals_domain");
+  m.normals = r.array<const float>("normals");
+  m.sharp_face = r.array<const uint8_t>("sharp_face");
+  read_common(r, m);
+  return m;
+}
+
+// gi_engine/scene_data.py Strands.
+MeshData read_strands(const Record& r) {
+  MeshData m;
+  m.name = r.get<std::string>("name");
+  m.primitive = r.choice<Primitive>("shape", {{"RIBBON", Primitive::kRibbon},
+                                              {"THICK", Primitive::kThick},
+                                              {"THICK_LINEAR", Primitive::kThickLinear},
+                                              {"SPHERE", Primitive::kSphere}});
+  m.positions = padded_positions(r);
+  m.radius = r.array<const float>("radius");
+  m.first_vertex = r.array<const int32_t>("first_vertex");
+  m.subdivisions = r.get<int>("subdivisions");
+  read_common(r, m);
   return m;
 }
 
@@ -246,7 +267,7 @@ SceneData read_scene(nb::handle scene, const KnownMeshes& known) {
   for (const Record& m : r.list("meshes", "mesh")) {
     const auto found = known.index.find(m.object.ptr());
     if (found == known.index.end() || known.data->meshes[size_t(found->second)].is_moved) {
-      d.meshes.push_back(read_mesh(m));
+      d.meshes.push_back(nb::hasattr(m.object, "first_vertex") ? read_strands(m) : read_mesh(m));
     } else {
       MeshData& mesh = d.meshes.emplace_back(known.data->meshes[size_t(found->second)]);
       mesh.before = found->second;

@@ -174,6 +174,8 @@ struct Bounds {
 struct Ray {
   Vec3 origin, direction;  // direction is unit
   float t_min = 0.0f, t_max = kInf;
+  // The strand or point of an instance that it does not meet: the one that it leaves; all ones where that is a surface.
+  uint32_t left_instance = 0xffffffffu, left_strand = 0xffffffffu;
 };
 
 }  // namespace gi

@@ -212,6 +212,7 @@ class BdptIntegrator final : public Integrator {
     bool may_scatter = true, meets = true;
     float travelled = 0;  // since the vertex before
     bool behind_portal = false;  // since the vertex before
+    bool left_strand = false;    // at the vertex before
 
     const auto add = [&](Rgb radiance, int depth) {
       if (!is_black(radiance))
@@ -222,7 +223,7 @@ class BdptIntegrator final : public Integrator {
     const auto found = [&](Rgb radiance, float pdf_direct, uint32_t emitter) {
       if (is_black(radiance)) return Rgb();
       float others = 0;
-      if (path.state.depth > 0 && !merging_.alone)
+      if (path.state.depth > 0 && (!merging_.alone || left_strand))
         others = h(pdf_direct) * weights.vcm +
                  h(meets ? s_.joined * pdf_emit(context, emitter, path.origin.query.position, path.ray.direction) : 0.0f) * weights.vc;
       return radiance * strategies_.weight(0, path.state.depth + 2, 1.0f / (1.0f + others));
@@ -256,22 +257,24 @@ class BdptIntegrator final : public Integrator {
       if (path.state.depth == 0)
         here.weights = {h(light_count / (s_.joined * lens_density(context.camera, camera.ray, segment) * pixels * cos_in)),
                         0.0f};  // [eq. 45]
-      if (behind_portal) here.weights = {};  // light does not find the way back
+      const bool on_strand = point.strand != kNoId;
+      if (behind_portal || on_strand) here.weights = {};  // light does not find the way back
+      if (on_strand) here.merged = 0.0f;
 
       const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
       const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
       const float u_continue = sampler.next_1d(), u_joined = sampler.next_1d();
-      if (may_scatter && !bsdf.is_delta() && merging_.paths > 0) {
+      if (may_scatter && !bsdf.is_delta() && merging_.paths > 0 && !on_strand) {
         result.radiance += path.throughput * merge(context, here);
         if (merging_.alone) bsdf.choose(kSpecular | kTransparent, point.wo);
       }
-      if (may_scatter && !bsdf.is_delta() && !merging_.alone) {
+      if (may_scatter && !bsdf.is_delta() && (!merging_.alone || on_strand)) {
         add(direct_light(context, here, u_light_choice, u_light), path.state.depth + 1);
         const auto join = [&](uint32_t k, float times, float u_left) {
           add(connect(context, here, light.vertices[k], u_left) / (times * float(light.counts[group])), path.state.depth + 2);
         };
-        if (path.state.depth < s_.limits.total)
-          light.choices[group].draw(point.position, point.ng, bsdf.flags() & kTransmission, connections_, u_joined, join);
+        if (path.state.depth < s_.limits.total && !merging_.alone)
+          light.choices[group].draw(point.position, bsdf.geometric_normal(), bsdf.flags() & kTransmission, connections_, u_joined, join);
       }
 
       // Draw the next direction.
@@ -296,14 +299,14 @@ class BdptIntegrator final : public Integrator {
       const float pdf_reverse = is_delta || here.weights.vc == 0.0f ? 0.0f : reverse(context, here, next->wi).pdf_dir;
       weights = here.weights.scattered(h, is_delta, abs_dot(point.ng, next->wi), next->pdf_dir, pdf_reverse, here.merged);
       meets = meets_light(context.scene, point);
-      travelled = 0, behind_portal = false;
+      travelled = 0, behind_portal = false, left_strand = on_strand;
       may_scatter = advance(path.state, next->flags, s_.limits);
       const FilmSpec& spec = film.spec();
       const bool through_glass = spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness;
       if (!through_glass) path.seen_from_camera = false;
       path.origin = {light_query(point, bsdf), is_delta ? kInf : next->pdf_dir};
       path.origin.query.path = path.state;
-      path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+      path.ray = ray_from(point, next->wi);
 
       // Russian roulette.
       const float alpha = path.state.depth <= min_bounces_ ? 1.0f : std::min(1.0f, max_component(path.throughput));
@@ -341,7 +344,7 @@ class BdptIntegrator final : public Integrator {
     const float distance = length(to);
     if (!(distance > 0.0f)) return Rgb();
     const Vec3 w = to / distance;
-    const float cos_z = dot(z.point.ng, w), cos_y = -dot(y.point.ng, w);
+    const float cos_z = dot(z.bsdf.geometric_normal(), w), cos_y = -dot(y.point.ng, w);
     if ((cos_z < 0.0f && !(z.bsdf.flags() & kTransmission)) || (cos_y < 0.0f && !(y.bsdf.flags() & kTransmission))) return Rgb();
 
     // Bounces as Blender counts them.
@@ -369,14 +372,15 @@ class BdptIntegrator final : public Integrator {
     const float weight = strategies_.weight(y.s(), z.state.depth + 2, 1.0f / (1.0f + others)), alpha = worth_a_look(weight);
     if (is_black(value) || !(u < alpha)) return Rgb();
 
-    const Vec3 start = offset_point(z.point.position, z.point.ng, w), end = offset_point(y.point.position, y.point.ng, -w);
+    const Ray out = ray_from(z.point, w);
+    const Vec3 start = out.origin, end = offset_point(y.point.position, y.point.ng, -w);
     const float free = length(end - start);
     PathState state = z.state;
     const bool within = advance(state, at_z, s_.limits);
     (void)within;
     return value * (weight / alpha) *
-           passage(context, {start, (end - start) / free, 0.0f, free * (1.0f - 1e-4f)}, visibility_of(state.kind), state,
-                   s_.limits.transparent);
+           passage(context, {start, (end - start) / free, 0.0f, free * (1.0f - 1e-4f), out.left_instance, out.left_strand},
+                   visibility_of(state.kind), state, s_.limits.transparent);
   }
 
   // Light subpaths that came here too, all as if to the same point. [Georgiev et al. 2012, eq. 8]
@@ -528,7 +532,7 @@ const Descriptor& bdpt_descriptor() {
       /*bakes=*/false,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesAbsorption | kCarriesPortals};
+      kCarriesAbsorption | kCarriesPortals | kCarriesStrands};
   return descriptor;
 }
 
@@ -568,7 +572,7 @@ const Descriptor& vcm_descriptor() {
       /*bakes=*/false,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesAbsorption | kCarriesPortals};
+      kCarriesAbsorption | kCarriesPortals | kCarriesStrands};
   return descriptor;
 }
 

@@ -56,7 +56,7 @@ class DistributedIntegrator final : public Integrator {
         continue;
       }
       path.travelled += hit->t;
-      path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+      path.ray = ray_from(point, next->wi);
       path.seen_from_camera = false;
       path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : next->pdf_dir};
       if (next->flags & kDiffuse) {
@@ -99,7 +99,7 @@ const Descriptor& distributed_descriptor() {
       /*bakes=*/false,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesAbsorption | kCarriesPortals};
+      kCarriesAbsorption | kCarriesPortals | kCarriesStrands};
   return descriptor;
 }
 

@@ -65,7 +65,7 @@ class Integrator {
 };
 
 // What paths may meet besides surfaces that scatter where they are met. Of the rest an integrator makes the surface's own fallback.
-enum Carries : uint8_t { kCarriesSubsurface = 1, kCarriesVolumes = 2, kCarriesAbsorption = 4, kCarriesPortals = 8 };
+enum Carries : uint8_t { kCarriesSubsurface = 1, kCarriesVolumes = 2, kCarriesAbsorption = 4, kCarriesPortals = 8, kCarriesStrands = 16 };
 
 struct Descriptor {
   const char* id;

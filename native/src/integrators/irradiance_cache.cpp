@@ -140,7 +140,7 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     LightQuery query = light_query(point, bsdf);
     bool is_cached = false;
     if (may_scatter && !is_black(path.throughput)) {
-      if (bsdf.flags() & kDiffuse) {
+      if ((bsdf.flags() & kDiffuse) && point.strand == kNoId) {
         const auto radiance = records_.read(point, bsdf, result);
         if (radiance) result.radiance += path.throughput * *radiance;
         is_cached = bool(radiance);
@@ -194,7 +194,7 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     path.state.without = next->flags & kDiffuse ? no_caustics_ : 0;
     path.origin = {query, delta ? kInf : next->pdf_dir};
     if (!delta) least_pdf = std::min(least_pdf, next->pdf_dir);
-    path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+    path.ray = ray_from(point, next->wi);
 
     // Russian roulette for all but luminaires, which the next ray meets anyway.
     const float alpha = std::min(1.0f, std::sqrt(max_component(max(path.throughput, abs(walk.to_excess)))));
@@ -255,7 +255,7 @@ const Descriptor& irradiance_cache_descriptor() {
       /*bakes=*/false,
       /*kept_version=*/4,
       /*kept_by_place=*/true,
-      kCarriesAbsorption | kCarriesPortals};
+      kCarriesAbsorption | kCarriesPortals | kCarriesStrands};
   return descriptor;
 }
 

@@ -222,6 +222,14 @@ double ParticleIntegrator::carry(const RenderContext& context, const EmittedRay&
       return worth;
     }
     ShadingPoint point = context.scene.shading_point(p.ray, *hit, p.state);
+    if (point.strand != kNoId) {  // its light is found from where it is seen; what it lets through goes on
+      const double before = sum(p.power);
+      p.power *= context.scene.transparency(point);
+      ledger.absorbed += before - sum(p.power);
+      if (is_black(p.power) || !advance(p.state, kTransparent, s_.limits)) break;
+      p.ray = ray_from(point, p.ray.direction);
+      continue;
+    }
     context.scene.shade(point, bsdf);
     const uint32_t visible = context.scene.instances()[point.instance].data->visibility;
     uint8_t kinds = kAllLobes;
@@ -233,7 +241,7 @@ double ParticleIntegrator::carry(const RenderContext& context, const EmittedRay&
       if ((!emitted.cast_shadow || !(visible & kRayShadow)) && p.bounce < kMostLayers) {
         Particle beyond = p;
         ++beyond.bounce;
-        beyond.ray = {offset_point(point.position, point.ng, p.ray.direction), p.ray.direction};
+        beyond.ray = ray_from(point, p.ray.direction);
         ledger.created += sum(p.power);
         worth += carry(context, emitted, std::move(beyond), ledger);
       }
@@ -270,7 +278,7 @@ double ParticleIntegrator::carry(const RenderContext& context, const EmittedRay&
     if (transparent && !within) break;
     if (!transparent) p.bounces.scatter(next->flags, s_.limits);
     if (!p.bounces.within || p.bounces.scattered > s_.limits.total) break;
-    p.ray = {offset_point(point.position, point.ng, next->wi), next->wi};
+    p.ray = ray_from(point, next->wi);
   }
   ledger.absorbed += sum(p.power);
   return worth;

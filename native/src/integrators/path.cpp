@@ -230,7 +230,7 @@ class PathIntegrator final : public Integrator {
       const bool delta = next->flags & kSpecular;
       path.origin = {light_query(point, bsdf), delta ? kInf : next->pdf_dir};
       path.state.least_pdf = delta ? least_pdf : std::min(least_pdf, next->pdf_dir);
-      path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+      path.ray = ray_from(point, next->wi);
 
       // Russian roulette.
       const float alpha = continuation_probability(s_, path.state, path.throughput, weight);
@@ -309,7 +309,7 @@ const Descriptor& path_descriptor() {
       /*bakes=*/true,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesSubsurface | kCarriesAbsorption | kCarriesVolumes | kCarriesPortals};
+      kCarriesSubsurface | kCarriesAbsorption | kCarriesVolumes | kCarriesPortals | kCarriesStrands};
   return descriptor;
 }
 

@@ -48,7 +48,7 @@ class WhittedIntegrator final : public Integrator {
       }
       path.seen_from_camera = false;
       path.travelled += hit->t;
-      path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+      path.ray = ray_from(point, next->wi);
     }
   }
 
@@ -87,7 +87,7 @@ const Descriptor& whitted_descriptor() {
       /*bakes=*/false,
       /*kept_version=*/0,
       /*kept_by_place=*/false,
-      kCarriesAbsorption | kCarriesPortals};
+      kCarriesAbsorption | kCarriesPortals | kCarriesStrands};
   return descriptor;
 }
 

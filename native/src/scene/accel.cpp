@@ -13,29 +13,56 @@ namespace {
 
 using namespace embree;
 
-// What all_hits hands to Embree's filter callback. Embree passes our Context on, so it comes first.
+// Embree passes our Context on, so it comes first.
+struct RayContext {
+  Context context{{kInvalidId}, {kInvalidId}};
+  uint32_t left_instance = kInvalidId, left_strand = kInvalidId;  // read where the ray says kLeavesStrand
+};
+
+enum RayId : uint32_t { kLeavesSurface, kLeavesStrand };
+
+// What all_hits hands to Embree's filter callback.
 struct CollectContext {
-  Context context;
+  RayContext ray;
   std::vector<gi::Hit>* hits;
 };
+
+uint32_t instance_of(const embree::Hit& h) { return h.instance[0] != kInvalidId ? h.instance[0] : h.geometry; }
+
+// What leaves a strand never meets that one again, as in Cycles: there, too, a strand scatters as a whole.
+void skip_own_strand(const FilterArguments* a) {
+  if (a->ray->id != kLeavesStrand) return;
+  const auto* ray = reinterpret_cast<const RayContext*>(a->context);
+  const uint32_t* strands = static_cast<const uint32_t*>(a->user);  // null: points
+  const uint32_t primitive = a->hit->primitive;
+  if (ray->left_instance == instance_of(*a->hit) && ray->left_strand == (strands ? strands[primitive] : primitive)) a->valid[0] = 0;
+}
+
+// Spheres and straight tubes, which are closed, are there from outside alone, however Embree was built.
+void skip_inside(const FilterArguments* a) {
+  const embree::Hit& h = *a->hit;
+  const embree::Ray& r = *a->ray;
+  if (h.ng_x * r.dx + h.ng_y * r.dy + h.ng_z * r.dz > 0.0f)
+    a->valid[0] = 0;
+  else
+    skip_own_strand(a);
+}
 
 void collect_hit(const FilterArguments* a) {
   const auto* collect = reinterpret_cast<const CollectContext*>(a->context);
   const embree::Hit& h = *a->hit;
-  const uint32_t instance = h.instance[0] != kInvalidId ? h.instance[0] : h.geometry;
-  collect->hits->push_back({a->ray->t_far, instance, h.primitive, h.u, h.v});
+  collect->hits->push_back({a->ray->t_far, instance_of(h), h.primitive, h.u, h.v});
   a->valid[0] = 0;  // go on
 }
 
 struct OneContext {
-  Context context;
+  RayContext ray;
   uint32_t instance;
 };
 
 void keep_instance(const FilterArguments* a) {
   const auto* one = reinterpret_cast<const OneContext*>(a->context);
-  const embree::Hit& h = *a->hit;
-  if ((h.instance[0] != kInvalidId ? h.instance[0] : h.geometry) != one->instance) a->valid[0] = 0;
+  if (instance_of(*a->hit) != one->instance) a->valid[0] = 0;
 }
 
 // Embree itself, for all Accels that share trees.
@@ -74,10 +101,29 @@ struct SharedDevice {
     return true;
   }
 
+  Geometry geometry(const AccelMesh& mesh) const { return mesh.strands ? strands(mesh) : triangles(mesh); }
+
   Geometry triangles(const AccelMesh& mesh) const {
     Geometry g = api.NewGeometry(device, kTriangle);
     api.SetSharedGeometryBuffer(g, kVertexBuffer, 0, kFloat3, mesh.positions, 0, 12, mesh.vertex_count);
     api.SetSharedGeometryBuffer(g, kIndexBuffer, 0, kUint3, mesh.indices, 0, 12, mesh.triangle_count);
+    return g;
+  }
+  Geometry strands(const AccelMesh& mesh) const {
+    const Strands& all = *mesh.strands;
+    static constexpr GeometryType kTypes[] = {kTriangle, kFlatCatmullRomCurve, kRoundCatmullRomCurve, kRoundLinearCurve, kSpherePoint};
+    Geometry g = api.NewGeometry(device, kTypes[int(all.primitive())]);
+    api.SetSharedGeometryBuffer(g, kVertexBuffer, 0, kFloat4, all.vertices().data(), 0, 16, all.vertices().size() / 4);
+    if (!all.are_points()) {
+      api.SetSharedGeometryBuffer(g, kIndexBuffer, 0, kUint, all.segments().data(), 0, 4, all.segments().size());
+      // As Cycles has them cut.
+      api.SetGeometryTessellationRate(g, float(std::min(1 << mesh.subdivisions, 16) + 1));
+      api.SetGeometryUserData(g, const_cast<uint32_t*>(all.strand_of_segments().data()));
+    }
+    const bool is_spline = all.is_ribbon() || all.primitive() == Primitive::kThick;
+    const Filter filter = is_spline ? &skip_own_strand : &skip_inside;
+    api.SetGeometryIntersectFilterFunction(g, filter);
+    api.SetGeometryOccludedFilterFunction(g, filter);
     return g;
   }
   void attach(Scene scene, Geometry geometry, uint32_t mask, uint32_t id) const {
@@ -96,7 +142,7 @@ struct MeshTree {
 
   MeshTree(std::shared_ptr<const SharedDevice> device, const AccelMesh& m) : shared(std::move(device)), mesh(m) {
     scene = shared->api.NewScene(shared->device);
-    shared->attach(scene, shared->triangles(mesh), 0xffffffffu, 0);
+    shared->attach(scene, shared->geometry(mesh), 0xffffffffu, 0);
     shared->api.CommitScene(scene);
   }
   MeshTree(const MeshTree&) = delete;
@@ -124,14 +170,17 @@ class EmbreeAccel final : public Accel {
 
   std::optional<gi::Hit> intersect(const gi::Ray& ray, uint32_t mask) const override {
     QueryArguments arguments;
+    RayContext leaves;
+    say_what_it_leaves(ray, leaves, arguments);
     return nearest(ray, mask, arguments);
   }
 
   std::optional<gi::Hit> intersect_instance(const gi::Ray& ray, uint32_t instance) const override {
-    OneContext one{{{kInvalidId}, {kInvalidId}}, instance};
+    OneContext one{{}, instance};
     QueryArguments arguments;
+    say_what_it_leaves(ray, one.ray, arguments);
     arguments.flags = kInvokeArgumentFilter;
-    arguments.context = &one.context;
+    arguments.context = &one.ray.context;
     arguments.filter = &keep_instance;
     return nearest(ray, 0xffffffffu, arguments);
   }
@@ -140,6 +189,8 @@ class EmbreeAccel final : public Accel {
     embree::Ray r;
     fill(r, ray, mask);
     QueryArguments arguments;
+    RayContext leaves;
+    say_what_it_leaves(ray, leaves, arguments);
     api_.Occluded1(top_, &r, &arguments);
     return r.t_far < 0.0f;
   }
@@ -148,10 +199,11 @@ class EmbreeAccel final : public Accel {
     hits.clear();
     embree::Ray r;
     fill(r, ray, mask);
-    CollectContext collect{{{kInvalidId}, {kInvalidId}}, &hits};
+    CollectContext collect{{}, &hits};
     QueryArguments arguments;
+    say_what_it_leaves(ray, collect.ray, arguments);
     arguments.flags = kInvokeArgumentFilter;
-    arguments.context = &collect.context;
+    arguments.context = &collect.ray.context;
     arguments.filter = &collect_hit;
     api_.Occluded1(top_, &r, &arguments);
     // Order and uniqueness must not depend on how the tree happens to be walked.
@@ -173,8 +225,13 @@ class EmbreeAccel final : public Accel {
     rh.hit.geometry = kInvalidId, rh.hit.instance[0] = kInvalidId;
     api_.Intersect1(top_, &rh, &arguments);
     if (rh.hit.geometry == kInvalidId) return {};
-    const uint32_t instance = rh.hit.instance[0] != kInvalidId ? rh.hit.instance[0] : rh.hit.geometry;
-    return gi::Hit{rh.ray.t_far, instance, rh.hit.primitive, rh.hit.u, rh.hit.v};
+    return gi::Hit{rh.ray.t_far, instance_of(rh.hit), rh.hit.primitive, rh.hit.u, rh.hit.v};
+  }
+
+  static void say_what_it_leaves(const gi::Ray& ray, RayContext& leaves, QueryArguments& arguments) {
+    if (ray.left_strand == kInvalidId) return;
+    leaves.left_instance = ray.left_instance, leaves.left_strand = ray.left_strand;
+    arguments.context = &leaves.context;
   }
 
   static void fill(embree::Ray& r, const gi::Ray& ray, uint32_t mask) {
@@ -188,7 +245,7 @@ class EmbreeAccel final : public Accel {
          0.0f,
          ray.t_max,
          mask,
-         0,
+         ray.left_strand == kInvalidId ? kLeavesSurface : kLeavesStrand,
          0};
   }
 
@@ -197,7 +254,7 @@ class EmbreeAccel final : public Accel {
     for (uint32_t i = 0; i < instances.size(); ++i) {
       const AccelInstance& instance = instances[i];
       const AccelMesh& mesh = meshes_[instance.mesh];
-      if (mesh.triangle_count == 0) continue;
+      if (mesh.empty()) continue;
       if (!instance.matrix) {
         shared_->attach(top_, shared_->triangles(mesh), instance.mask, i);
         continue;

@@ -1,4 +1,4 @@
-// Ray tracing against triangles: the only place that knows Embree.
+// Ray tracing against triangles, curves and spheres: the only place that knows Embree.
 #pragma once
 #include <functional>
 #include <memory>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/vec.h"
+#include "scene/strands.h"
 
 namespace gi {
 
@@ -24,6 +24,9 @@ struct AccelMesh {
   const uint32_t* indices = nullptr;
   size_t triangle_count = 0;
   std::shared_ptr<void> positions_owner, indices_owner;
+  std::shared_ptr<const Strands> strands;  // instead of triangles; such meshes stay in object space
+  int subdivisions = 0;
+  bool empty() const { return strands ? strands->count() == 0 : triangle_count == 0; }
 };
 
 struct AccelInstance {

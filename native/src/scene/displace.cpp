@@ -80,7 +80,7 @@ void Scene::displace(const Scene* before, int threads) {
   undisplaced_tangents_.resize(data_.meshes.size());
   for (uint32_t i = 0; i < instances_.size(); ++i) {
     int32_t& mover = moved_by_[instances_[i].mesh];
-    if (mover < 0 && !movers_of(data_, data_.instances[i]).empty()) mover = int32_t(i);
+    if (mover < 0 && !data_.meshes[instances_[i].mesh].is_strands() && !movers_of(data_, data_.instances[i]).empty()) mover = int32_t(i);
   }
   for (uint32_t m = 0; m < data_.meshes.size(); ++m) {
     MeshData& mesh = data_.meshes[m];

@@ -15,9 +15,16 @@ using Scene = SceneImpl*;
 using Geometry = GeometryImpl*;
 
 inline constexpr uint32_t kInvalidId = 0xffffffffu;
-enum Format : int { kUint3 = 0x5003, kFloat3 = 0x9003, kFloat3x4RowMajor = 0x9134 };
+enum Format : int { kUint = 0x5001, kUint3 = 0x5003, kFloat3 = 0x9003, kFloat4 = 0x9004, kFloat3x4RowMajor = 0x9134 };
 enum BufferType : int { kIndexBuffer = 0, kVertexBuffer = 1 };
-enum GeometryType : int { kTriangle = 0, kInstance = 121 };
+enum GeometryType : int {
+  kTriangle = 0,
+  kRoundLinearCurve = 16,
+  kSpherePoint = 50,
+  kRoundCatmullRomCurve = 58,
+  kFlatCatmullRomCurve = 59,
+  kInstance = 121
+};
 enum BuildQuality : int { kLow = 0, kMedium = 1 };
 enum SceneFlags : int { kNoFlags = 0, kRobust = 4 };
 enum QueryFlags : int { kIncoherent = 0, kInvokeArgumentFilter = 1 << 1 };
@@ -79,6 +86,10 @@ using MemoryFunction = bool (*)(void*, ptrdiff_t, bool);
   X(CommitGeometry, void, (Geometry))                                                                   \
   X(SetGeometryMask, void, (Geometry, uint32_t))                                                        \
   X(SetSharedGeometryBuffer, void, (Geometry, int, uint32_t, int, const void*, size_t, size_t, size_t)) \
+  X(SetGeometryTessellationRate, void, (Geometry, float))                                               \
+  X(SetGeometryUserData, void, (Geometry, void*))                                                       \
+  X(SetGeometryIntersectFilterFunction, void, (Geometry, Filter))                                       \
+  X(SetGeometryOccludedFilterFunction, void, (Geometry, Filter))                                        \
   X(SetGeometryInstancedScene, void, (Geometry, Scene))                                                 \
   X(SetGeometryTransform, void, (Geometry, uint32_t, int, const void*))                                 \
   X(Intersect1, void, (Scene, RayHit*, QueryArguments*))                                                \

@@ -38,7 +38,7 @@ float pixel_across(const ShadingPoint& p) {
 void wireframe(const Operands& o, ShadeState& s) {
   const ShadingPoint& p = s.point;
   o.set(0, 0.0f);
-  if (!s.resources.scene || p.instance == kNoId) return;
+  if (!s.resources.scene || p.instance == kNoId || p.strand != kNoId) return;
   Vec3 v[3];
   s.resources.scene->triangle_vertices(p.instance, p.triangle, v);
   // A wire is split between the two faces of its edge.

@@ -75,6 +75,10 @@ struct Edges {
 
 // Of the surface as it is traced.
 Edges edges_of(const ShadeState& s) {
+  if (s.point.strand != kNoId) {
+    const Vec3 along = s.resources.scene->strand_place(s.point).along;
+    return {along, cross(along, s.point.ng)};
+  }
   Vec3 v[3];
   s.resources.scene->triangle_vertices(s.point.instance, s.point.triangle, v);
   return {v[1] - v[0], v[2] - v[0]};

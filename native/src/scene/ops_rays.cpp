@@ -60,13 +60,14 @@ void ambient_occlusion(const Operands& o, ShadeState& s) {
   const float distance = o.f(1);
   const int rays = std::min(o.imm(3), kMostRays);
   o.set(0, 1.0f);
-  if (!scene || !(distance > 0.0f) || rays < 1) return;
+  if (!scene || !(distance > 0.0f) || rays < 1 || (o.imm(5) && s.point.strand != kNoId)) return;  // strands do not see themselves
   const Vec3 n = normalize_or(o.v(2), s.point.ns);
   const Frame frame = Frame::from_normal(o.imm(4) ? -n : n);
   const PointSamples samples(s.point, 1);
   int free = 0;
   for (int i = 0; i < rays; ++i) {
-    const Ray ray{s.point.position, frame.to_world(sample_cosine_hemisphere(samples[i])), first_step(s.point), distance};
+    const Ray ray{s.point.position, frame.to_world(sample_cosine_hemisphere(samples[i])), first_step(s.point), distance, s.point.instance,
+                  s.point.strand};
     free += !(o.imm(5) ? scene->intersect_instance(ray, s.point.instance).has_value() : scene->occluded(ray));
   }
   o.set(0, float(free) / float(rays));
@@ -149,7 +150,8 @@ void bevel(const Operands& o, ShadeState& s) {
   const float radius = o.f(1);
   const int rays = std::min(o.imm(3), kMostRays);
   Vec3 n = s.point.ns;
-  if (scene && radius > 0.0f && rays > 0 && s.point.path.least_pdf >= kSharpEnough) n = mean_normal(*scene, s.point, radius, rays);
+  if (scene && s.point.strand == kNoId && radius > 0.0f && rays > 0 && s.point.path.least_pdf >= kSharpEnough)
+    n = mean_normal(*scene, s.point, radius, rays);
   o.set(0, normalize_or(o.v(2) + (n - s.point.ns), s.point.ns));
 }
 
@@ -172,7 +174,7 @@ void raycast(const Operands& o, ShadeState& s) {
   const auto hit = cast(s, from, direction, reach, o.imm(8) != 0, kAnyone);
   o.set(0, hit ? 1.0f : 0.0f), o.set(1, hit && hit->instance == s.point.instance ? 1.0f : 0.0f);
   o.set(2, hit ? hit->t : reach), o.set(3, hit ? from + direction * hit->t : Vec3{});
-  o.set(4, hit ? scene_of(s)->surface_point(hit->instance, hit->triangle, hit->b1, hit->b2, -direction, {}).ns : Vec3{});
+  o.set(4, hit ? scene_of(s)->shading_point({from, direction}, *hit, {}).ns : Vec3{});
 }
 
 // -> an attribute where the ray ends: vector, mean, alpha; as raycast; attribute slot
@@ -182,7 +184,7 @@ void raycast_attribute(const Operands& o, ShadeState& s) {
   int components = 0;
   if (const auto hit = cast(s, o.v(3), direction, o.f(5), o.imm(6) != 0, kAnyone)) {
     const Scene& scene = *scene_of(s);
-    components = scene.attribute(scene.surface_point(hit->instance, hit->triangle, hit->b1, hit->b2, -direction, {}), o.imm(7), a);
+    components = scene.attribute(scene.shading_point({o.v(3), direction}, *hit, {}), o.imm(7), a);
   }
   if (components == 1) a[1] = a[2] = a[0];
   o.set(0, Vec3{a[0], a[1], a[2]});

@@ -9,6 +9,7 @@
 
 #include "scene/accel.h"
 #include "scene/scene_data.h"
+#include "scene/strands.h"
 #include "scene/tangents.h"
 #include "shading/program.h"
 #include "shading/resources.h"
@@ -74,9 +75,11 @@ class Scene {
 
   // What programs may ask. `ray` is the one that hit; `footprint` is the pixel's radius there, in metres.
   ShadingPoint shading_point(const Ray& ray, const Hit& hit, const PathState& path, float footprint = 0) const;
-  // The point of triangle `triangle` at barycentrics (b1, b2), seen from direction `wo`: for light sampling and texels.
+  // The point of triangle `triangle` at barycentrics (b1, b2), seen from direction `wo`: for light sampling and texels. Not of strands.
   ShadingPoint surface_point(uint32_t instance, uint32_t triangle, float b1, float b2, Vec3 wo, const PathState& path,
                              float footprint = 0) const;
+  // The same point seen from `wo`. Ribbons turn.
+  ShadingPoint turned(const ShadingPoint& point, Vec3 wo, const PathState& path) const;
   // Where a shadow ray towards `wi` starts: near the terminator of a smooth-shaded mesh lifted towards the surface that the
   // normals suggest, or the facets would show in the shadow. [Hanika 2021, "Hacking the shadow terminator"]
   Vec3 shadow_origin(const ShadingPoint& point, Vec3 wi) const;
@@ -111,6 +114,14 @@ class Scene {
   // object's materials take tangents of; null if the object has no such map.
   std::optional<CornerTangent> uv_tangent(const ShadingPoint& point, int slot, bool undisplaced = false) const;
 
+  // A strand's own at the point, in world space: towards its tip and, where that is asked for, as thick as it is (metres).
+  struct StrandPlace {
+    Vec3 center, along;
+    float thickness = 0;
+  };
+  StrandPlace strand_place(const ShadingPoint& point) const;
+  bool is_ribbon(const ShadingPoint& point) const { return point.strand != kNoId && strands_[point.mesh]->is_ribbon(); }
+
   // Null where there is no true displacement.
   std::optional<Undisplaced> undisplaced(const ShadingPoint& point) const;
   // Whether rays can be traced already: not while the surface is being displaced.
@@ -131,6 +142,7 @@ class Scene {
   using Tangents = std::shared_ptr<const std::vector<CornerTangent>>;  // of each corner of a mesh's triangles
 
   void index_vertices(const Scene* before);
+  void make_strands(const Scene* before);
   void place_instances();
   void place_meshes(const Editing& editing);
   void displace(const Scene* before, int threads);
@@ -146,6 +158,8 @@ class Scene {
   Tangents known_tangents(const MeshData& mesh, int slot, const Scene* before) const;
   std::vector<CornerTangent> tangents_of(uint32_t mesh, int slot) const;
   void build_accel(const std::string& embree, int threads, const Scene* before);
+  ShadingPoint strand_point(const Hit& hit, Vec3 position, Vec3 wo, const PathState& path, float footprint) const;
+  void set_strand_normals(ShadingPoint& point) const;
   Vec3 vertex(const Instance& instance, uint32_t v) const;
   Vec3 corner_normal(uint32_t mesh, uint32_t triangle, int k) const;
   void interpolate(uint32_t mesh, const AttributeData& attribute, const ShadingPoint& point, float out[4]) const;
@@ -158,12 +172,16 @@ class Scene {
   std::vector<int32_t> moved_by_;                      // per mesh: the instance whose materials displace it, or -1
   std::vector<int32_t> active_uv_;                     // per mesh: which attribute, or -1
   std::vector<Array<const uint32_t>> indices_;         // per mesh: Embree's index buffer
+  std::vector<std::shared_ptr<const Strands>> strands_;  // per mesh; null where it is of triangles
   std::vector<Bounds> mesh_bounds_;                    // per mesh, of its positions as they are
   std::unique_ptr<ShaderResources> resources_;
   std::unique_ptr<Accel> accel_;
   mutable std::array<RayCounter, kRayCounters> rays_;
   Bounds bounds_;
   bool any_transparent_ = false;
+  // Instances whose materials may let shadow rays through answer to this bit instead of kRayShadow, so that one occlusion query settles
+  // all that is opaque.
+  static constexpr uint32_t kTransparentShadowBit = 1u << 16;
   static constexpr uint32_t kVolumeBit = 1u << 17;  // what objects that are filled answer to
 };
 

@@ -29,6 +29,9 @@ struct AttributeData {
   Array<const float> data;
 };
 
+// What a mesh is made of. Ribbons turn to whoever sees them and are shaded as if they were round.
+enum class Primitive : uint8_t { kTriangle, kRibbon, kThick, kThickLinear, kSphere };
+
 // What true displacement changes of a mesh.
 struct MeshShape {
   Array<float> positions;
@@ -49,7 +52,13 @@ struct MeshData {
   int32_t before = -1;  // which mesh of the scene before this one it is (Editing), checked there; -1: none
   bool is_moved = false;  // by Scene, to world space
   std::optional<MeshShape> undisplaced;  // object space; where true displacement has moved the mesh
+  Primitive primitive = Primitive::kTriangle;
+  Array<const float> radius;         // of vertices; where the primitive is no triangle
+  Array<const int32_t> first_vertex;  // of each curve, and the number of vertices; none of points
+  int subdivisions = 2;              // of ribbons: a segment is cut into 2^n + 1 straight pieces, 17 at the most
   std::vector<std::string> warnings;
+  bool is_strands() const { return primitive != Primitive::kTriangle; }  // curves or points
+  size_t strand_count() const { return primitive == Primitive::kSphere ? vertex_count() : std::max<size_t>(first_vertex.size, 1) - 1; }
   size_t triangle_count() const { return (triangulated ? corner_vert.size : tri_corner.size) / 3; }
   size_t corner(size_t k) const { return triangulated ? k : size_t(tri_corner[k]); }  // 3 per triangle
   bool has_faces() const { return triangulated || !tri_face.empty(); }
@@ -57,6 +66,8 @@ struct MeshData {
   bool is_flat(size_t triangle) const {
     return normals_domain == Domain::kFace || (!sharp_face.empty() && sharp_face[face(triangle)] != 0);
   }
+  // As in Cycles, which shades flat faces among smooth ones by the normals of their corners until they are displaced.
+  bool shades_flat(size_t triangle) const { return normals_domain == Domain::kFace || (undisplaced && is_flat(triangle)); }
   size_t vertex_count() const { return positions.size / 3; }
 };
 

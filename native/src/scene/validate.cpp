@@ -47,7 +47,34 @@ size_t elements(const MeshData& mesh, Domain domain, size_t faces) {
   return domain == Domain::kPoint ? mesh.vertex_count() : domain == Domain::kCorner ? mesh.corner_vert.size : faces;
 }
 
+void require_attribute(const AttributeData& a, const std::string& who, size_t least) {
+  require(a.components >= 1 && a.components <= 4, who + "attribute '" + a.name + "' must have 1 to 4 components");
+  require(a.data.size >= least * size_t(a.components), who + "attribute '" + a.name + "' has " + std::to_string(a.data.size) +
+                                                           " values instead of " + std::to_string(least * size_t(a.components)));
+}
+
+// Embree leaves out segments whose vertices are not finite by itself.
+void validate_strands(MeshData& mesh) {
+  const std::string who = "'" + mesh.name + "': ";
+  require(mesh.positions.size % 3 == 0, who + "positions must have 3 columns");
+  require(mesh.radius.size == mesh.vertex_count(), who + "radius must have one number for each vertex");
+  require(mesh.subdivisions >= 0 && mesh.subdivisions <= 24, who + "subdivisions must be 0 to 24");
+  const Array<const int32_t>& first = mesh.first_vertex;
+  if (mesh.primitive == Primitive::kSphere) {
+    require(first.empty(), who + "points have no first_vertex");
+  } else {
+    require(!first.empty() && first[0] == 0 && size_t(first[first.size - 1]) == mesh.vertex_count(),
+            who + "first_vertex must begin with 0 and end with the number of vertices");
+    for (size_t s = 1; s < first.size; ++s) require(first[s] >= first[s - 1], who + "first_vertex must not fall");
+  }
+  for (const AttributeData& a : mesh.attributes) {
+    require(a.domain != Domain::kCorner, who + "attribute '" + a.name + "' must be of vertices (POINT) or strands (FACE)");
+    require_attribute(a, who, a.domain == Domain::kPoint ? mesh.vertex_count() : mesh.strand_count());
+  }
+}
+
 void validate_mesh(MeshData& mesh) {
+  if (mesh.is_strands()) return validate_strands(mesh);
   const std::string who = "mesh '" + mesh.name + "': ";
   require(mesh.positions.size % 3 == 0, who + "positions must have 3 columns");
   require(mesh.tri_corner.size % 3 == 0, who + "tri_corner must have 3 columns");
@@ -70,12 +97,9 @@ void validate_mesh(MeshData& mesh) {
             who + "normals has " + std::to_string(mesh.normals.size) + " values instead of " + std::to_string(want));
   }
   for (const AttributeData& a : mesh.attributes) {
-    require(a.components >= 1 && a.components <= 4, who + "attribute '" + a.name + "' must have 1 to 4 components");
     require(a.domain != Domain::kFace || mesh.has_faces() || mesh.triangle_count() == 0,
             who + "attribute '" + a.name + "' on faces needs tri_face");
-    const size_t least = elements(mesh, a.domain, faces) * size_t(a.components);
-    require(a.data.size >= least,
-            who + "attribute '" + a.name + "' has " + std::to_string(a.data.size) + " values instead of " + std::to_string(least));
+    require_attribute(a, who, elements(mesh, a.domain, faces));
   }
 }
 
@@ -112,7 +136,7 @@ void validate(SceneData& data, std::vector<std::string>& warnings) {
       return true;
     }
     // A flattened mesh that is used once still shows its outline; as an instance it cannot be traced.
-    if (uses[i.mesh] > 1 && i.matrix.inverse().determinant() == 0.0f) {
+    if ((uses[i.mesh] > 1 || data.meshes[i.mesh].is_strands()) && i.matrix.inverse().determinant() == 0.0f) {
       warnings.push_back("object '" + i.name + "' has a singular transform (a scale of 0): left out");
       return true;
     }

@@ -62,7 +62,7 @@ Bsdf::Entry* Bsdf::new_entry(Rgb weight, uint8_t flags, const Frame& frame) {
   const uint8_t left = flags & ~sides_without(flags, without_);
   if (!(left & (kReflection | kTransmission))) return nullptr;
   Entry& e = entries_[count_++];
-  e.frame = frame, e.weight = w, e.albedo = -1.0f, e.flags = left, e.bumped = !(frame.z == ns_), e.all_around = false;
+  e.frame = frame, e.weight = w, e.albedo = -1.0f, e.flags = left, e.bumped = !on_curve_ && !(frame.z == ns_), e.all_around = false;
   flags_ |= left;
   return &e;
 }

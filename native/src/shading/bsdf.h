@@ -39,8 +39,14 @@ class Bsdf {
   // `without`: CausticFlags, sides of glossy lobes to leave out.
   void clear(Vec3 ng, Vec3 ns, uint8_t without = 0) {
     count_ = 0, subsurface_count_ = 0, portal_count_ = 0, flags_ = 0, chosen_ = kAll, ng_ = ng, ns_ = ns, without_ = without,
-    emission = Rgb(), transparency = Rgb(), holdout = Rgb();
+    on_curve_ = on_point_ = false, emission = Rgb(), transparency = Rgb(), holdout = Rgb();
   }
+  // A curve takes nothing from bumped normals, and has no side but that of its shading normal `ns`: for a ribbon's own, which is the view,
+  // it would be too dark. So in Cycles. After clear().
+  void set_on_curve() { on_curve_ = true, ng_ = ns_; }
+  bool on_curve() const { return on_curve_; }
+  // Points are scattered below of as if they were dense. After clear().
+  void set_on_point() { on_point_ = true; }
   uint8_t without() const { return without_; }
   void set_geometric_normal(Vec3 ng) { ng_ = ng; }
   // The object's shadow terminator offset, as a frequency: 1 / (1 − offset / 2). Survives clear().
@@ -52,7 +58,7 @@ class Bsdf {
 
   // Whether the integrator follows light below the surface; if not, it is diffuse of the same albedo. Survives clear().
   void carry_subsurface(bool on) { carries_subsurface_ = on; }
-  bool carries_subsurface() const { return carries_subsurface_; }
+  bool carries_subsurface() const { return carries_subsurface_ && !on_point_; }
   // Where it is carried. Channels of no radius are diffuse.
   void add_subsurface(const Subsurface& s);
   const Subsurface& subsurface(int i) const { return subsurface_[i]; }
@@ -160,7 +166,7 @@ class Bsdf {
   uint8_t flags_ = 0, without_ = 0, chosen_ = kAll;
   float select_transparent_ = 0;
   float terminator_ = 1;
-  bool correct_bumps_ = true;
+  bool correct_bumps_ = true, on_curve_ = false, on_point_ = false;
   Vec3 ng_{0, 0, 1}, ns_{0, 0, 1};  // both face wo
 };
 

@@ -28,7 +28,7 @@ inline void add_diffuse(ShadeState& s, Rgb weight, Rgb color, float roughness, V
 inline Vec3 normal_or_shading(const ShadeState& s, Vec3 n) { return normalize_or(n, s.point.ns); }
 
 inline Vec3 visible_normal(const ShadeState& s, Vec3 n) {
-  return s.bsdf->bump_correction() ? valid_reflection_normal(s.point.ng, s.point.wo, n) : n;
+  return s.bsdf->bump_correction() && !s.bsdf->on_curve() ? valid_reflection_normal(s.point.ng, s.point.wo, n) : n;
 }
 
 // `v` turned by `angle` radians, right-handed, about the unit `axis`. [Rodrigues]

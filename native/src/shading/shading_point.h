@@ -38,7 +38,8 @@ struct ShadingPoint {
   bool inside = false;   // within a volume: what the mesh knows of its surface is not asked
   Vec3 object_position;  // in the instance's own space
   uint32_t instance = kNoId, mesh = kNoId, triangle = kNoId;  // kNoId on the world and on lamps
-  float b1 = 0, b2 = 0;  // barycentrics of the triangle's 2nd and 3rd corner
+  uint32_t strand = kNoId;  // which of the curves or points of a mesh of those; `triangle` is then the curve's segment, or the point
+  float b1 = 0, b2 = 0;  // barycentrics of the triangle's 2nd and 3rd corner; along the segment, and across a ribbon from −1 to 1
   float shift1 = 0, shift2 = 0;  // how far bumps have moved the barycentrics
   float footprint = 0;    // radius of the pixel on the surface, metres: what Bump steps by; 0 where the path has none
   float undisplaced_step = 0;  // seen where it was before true displacement, with steps that much as long; 0: seen where it is

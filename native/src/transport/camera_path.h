@@ -135,7 +135,7 @@ struct CameraPath {
   void pass(const ShadingPoint& point, const Bsdf& bsdf, const BsdfSample& next, float distance) {
     travelled += distance;
     if (next.which < 0) {
-      ray = {offset_point(point.position, point.ng, ray.direction), ray.direction, 0.0f, ray.t_max - distance};
+      ray = ray_from(point, ray.direction, ray.t_max - distance);
     } else {
       constexpr float kMoved2 = 1e-9f;  // square metres; Blender's own
       const Portal& p = bsdf.portal(next.which);

@@ -34,7 +34,7 @@ inline Rgb meet_light(const RenderContext& context, const BounceLimits& limits, 
   const RayOrigin origin{light_query(point, bsdf), next->pdf_dir};
   advance(state, next->flags, limits);
   const uint32_t visibility = visibility_of(state.kind);
-  Ray ray{offset_point(point.position, point.ng, next->wi), next->wi};
+  Ray ray = ray_from(point, next->wi);
   Rgb throughput = next->value / next->pdf_dir, found;
   do {
     const auto hit = context.scene.intersect(ray, visibility);
@@ -44,7 +44,7 @@ inline Rgb meet_light(const RenderContext& context, const BounceLimits& limits, 
     ShadingPoint met = context.scene.shading_point(ray, *hit, state);
     found += throughput * surface_emission(context, met, context.scene.emission(met), origin, kMode);
     throughput *= context.scene.transparency(met);
-    ray.origin = offset_point(met.position, met.ng, ray.direction);
+    ray = ray_from(met, ray.direction);
   } while (!is_black(throughput) && advance(state, kTransparent, limits));
   return found;
 }
@@ -102,7 +102,8 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
                                  [p](Vec3, const LobeEval& e) { return p * e.pdf_dir; });
     };
     float p_lobes = 1.0f;  // of the choice between diffuse lobes and others
-    const bool ends = may_scatter && (bsdf.flags() & kDiffuse);
+    const bool on_strand = point.strand != kNoId;  // where no light path ends: nothing is known there
+    const bool ends = may_scatter && (bsdf.flags() & kDiffuse) && !on_strand;
     const std::optional<KnownLight> found = ends ? at_end(point, bsdf, gathered) : std::nullopt;
     const bool gathers = ends && !found;
     if (gathers) {
@@ -134,7 +135,7 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
         }
         bsdf.choose(kOthers, point.wo);
       }
-      if (!(gathered && s.caustics_known)) add(direct_light(), depth + 1, kSpecularTerm);
+      if (on_strand || !(gathered && s.caustics_known)) add(direct_light(), depth + 1, kSpecularTerm);
     }
 
     const auto next = bsdf.sample(point.wo, u, u_lobe);
@@ -156,11 +157,11 @@ void trace_to_diffuse(const RenderContext& context, const Film& film, const Diff
     const FilmSpec& spec = film.spec();
     if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
       path.seen_from_camera = false;
-    known = gathered && !gathers_next && s.caustics_known;
+    known = gathered && !gathers_next && s.caustics_known && !on_strand;
     if (gathers_next) gathered = true;
     path.state.without = next->flags & kDiffuse ? s.without : 0;
     path.origin = {light_query(point, bsdf), next->flags & kSpecular ? kInf : p_lobes * next->pdf_dir};
-    path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+    path.ray = ray_from(point, next->wi);
 
     const float alpha = std::min(1.0f, max_component(weight));
     if (alpha < 1.0f) {

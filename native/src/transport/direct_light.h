@@ -65,7 +65,8 @@ inline Rgb shadowed(const RenderContext& context, const ShadingPoint& point, con
   if (!light.cast_shadow || is_black(contribution)) return contribution;
   // Towards the sampled point itself: the ray starts a little beside the point that it was sampled from, and would
   // otherwise pass or meet a luminaire that is very near.
-  Ray ray{offset_point(context.scene.shadow_origin(point, light.wi), point.ng, light.wi), light.wi, 0.0f, kInf};
+  Ray ray = ray_from(point, light.wi);
+  if (point.strand == kNoId) ray.origin = offset_point(context.scene.shadow_origin(point, light.wi), point.ng, light.wi);
   if (std::isfinite(light.distance)) {
     const Vec3 to = point.position + light.wi * light.distance - ray.origin;
     const float distance = length(to);

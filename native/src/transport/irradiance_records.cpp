@@ -220,7 +220,7 @@ void IrradianceRecords::seek(const Work& work, const Camera& eye, int x, int y, 
     const ShadingPoint point = path.arrive(context, work.film, camera, *hit, bsdf, nowhere);
     const int here = level_of(path.state);
     if (here > level) return;
-    if (here == level) {
+    if (here == level && point.strand == kNoId) {
       for (const uint8_t side : {kReflection, kTransmission}) {
         if (is_black(bsdf.diffuse_albedo(point.wo, side))) continue;
         const float sign = side == kReflection ? 1.0f : -1.0f;
@@ -239,7 +239,7 @@ void IrradianceRecords::seek(const Work& work, const Camera& eye, int x, int y, 
       continue;
     }
     path.travelled += hit->t, path.seen_from_camera = false;
-    path.ray = {offset_point(point.position, point.ng, next->wi), next->wi, 0.0f, kInf};
+    path.ray = ray_from(point, next->wi);
   }
 }
 

@@ -92,6 +92,7 @@ void Media::begin_at(const Scene& scene, Vec3 position, Vec3 direction) {
 }
 
 void Media::cross(const Scene& scene, const ShadingPoint& point, Vec3 direction) {
+  if (point.strand != kNoId) return;  // holds nothing
   const bool inwards = (dot(point.ng, direction) < 0.0f) != point.backfacing;
   set(scene, point.instance, point.triangle, inwards);
 }

@@ -11,8 +11,7 @@ Rgb delta_factor(const RenderContext& context, const ShadingPoint& point, const 
   static thread_local Bsdf bsdf;
   const uint32_t kind = next.flags & kTransmission ? kRayTransmission : kRayGlossy;
   if (!(seen_by & kind)) return Rgb();
-  ShadingPoint turned =
-      context.scene.surface_point(point.instance, point.triangle, point.b1, point.b2, next.wi, point.path, point.footprint);
+  ShadingPoint turned = context.scene.turned(point, next.wi, point.path);
   context.scene.shade(turned, bsdf);
   const auto e = bsdf.eval_delta(next.wi, point.wo);
   if (!e) return Rgb();
@@ -50,7 +49,7 @@ LobeEval eval_turned(const RenderContext& context, const ShadingPoint& point, co
   const Program& program = context.scene.material(context.scene.material_of(point.instance, point.triangle)).program;
   if (!program.sees_view() && dot(point.ng, w) > 0.0f && bsdf.is_view_free()) return eval_seen_by(bsdf, w, point.wo, seen_by);
   static thread_local Bsdf other;
-  ShadingPoint turned = context.scene.surface_point(point.instance, point.triangle, point.b1, point.b2, w, path, point.footprint);
+  ShadingPoint turned = context.scene.turned(point, w, path);
   turned.path.ray_length = point.path.ray_length;
   context.scene.shade(turned, other);
   return eval_seen_by(other, w, point.wo, seen_by);
@@ -74,7 +73,7 @@ Rgb passage(const RenderContext& context, Ray ray, uint32_t visibility, PathStat
     passed *= context.scene.transparency(point);
     if (is_black(passed)) return Rgb();
     ++path.transparent_depth;
-    ray = {offset_point(point.position, point.ng, ray.direction), ray.direction, 0.0f, ray.t_max - hit->t};
+    ray = ray_from(point, ray.direction, ray.t_max - hit->t);
   }
   return Rgb();
 }
@@ -111,7 +110,14 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     LightVertex& v = vertices.grow();
     v.point = context.scene.shading_point(ray, *hit, state);
     if (carried.is_first() && !(visible & kRayShadow)) {  // throws no shadow: the light goes on as if nothing were there
-      ray = {offset_point(v.point.position, v.point.ng, ray.direction), ray.direction};
+      ray = ray_from(v.point, ray.direction);
+      continue;
+    }
+    if (v.point.strand != kNoId) {  // passes where that is see-through, and ends otherwise
+      passed *= context.scene.transparency(v.point);
+      if (is_black(passed) || !advance(state, kTransparent, settings.limits)) return;
+      travelled += hit->t;
+      ray = ray_from(v.point, ray.direction);
       continue;
     }
     v.point.footprint = settings.footprint(v.point.position);
@@ -153,7 +159,7 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
       passed *= next->value / next->pdf_dir;
       if (!advance(state, next->flags, settings.limits) || is_black(passed)) return;
       travelled += hit->t;
-      ray = {offset_point(v.point.position, v.point.ng, ray.direction), ray.direction};
+      ray = ray_from(v.point, ray.direction);
       continue;
     }
     carried.bounces = v.bounces;
@@ -178,7 +184,7 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     if (settings.only_by_mirrors && is_black(carried.by_mirrors)) return;
     carried.scattered = v.scattered + 1, carried.seen_by = visible;
     passed = Rgb(1.0f), travelled = 0;
-    ray = {offset_point(v.point.position, v.point.ng, next->wi), next->wi};
+    ray = ray_from(v.point, next->wi);
   }
 }
 

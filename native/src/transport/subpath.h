@@ -138,8 +138,10 @@ struct Adjoint {
 Adjoint adjoint(const RenderContext& context, const ShadingPoint& point, const Bsdf& bsdf, const BsdfSample& next, const PathState& path,
                 uint32_t seen_by = 0xffffffffu);
 
-// Whether light subpaths may begin with a ray to this surface.
+// Whether light subpaths may begin with a ray to this surface. They never end on strands: what a ribbon is depends on who looks, and which
+// side of a fibre light comes in by is not known where it comes out.
 inline bool meets_light(const Scene& scene, const ShadingPoint& point) {
+  if (point.strand != kNoId) return false;
   const uint32_t v = scene.instances()[point.instance].data->visibility;
   return (v & kRayShadow) && (v & (kRayDiffuse | kRayGlossy | kRayTransmission));
 }

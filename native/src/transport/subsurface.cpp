@@ -58,6 +58,7 @@ SubsurfaceExit leave(const Scene& scene, const ShadingPoint& entry, const Subsur
 }  // namespace
 
 std::optional<SubsurfaceExit> walk_below(const Scene& scene, const ShadingPoint& entry, const Subsurface& surface, Sampler sampler) {
+  if (entry.strand != kNoId) return {};  // as Cycles has it, nothing comes out of a curve
   const auto entered = enter(entry, surface, sampler.next_2d());
   if (!entered || dot(entry.ng, *entered) >= 0.0f) return {};
   const SubsurfaceMedium medium = medium_of(surface);
