@@ -5,6 +5,7 @@ Normal and Coat Normal that are not linked are the zero vector, which the ops ta
 
 from __future__ import annotations
 
+from .attributes import STRAND_RANDOM
 from .program import Value
 from .rules import closure_rule
 from .rules_input import surface_tangent
@@ -283,7 +284,7 @@ def hair(b, weight):
 @closure_rule("ShaderNodeBsdfHairPrincipled")
 def principled_hair(b, weight):
     along, _, _, met = b.op("strand")
-    random, uneven = b.input("Random"), b.input("Random Roughness")
+    random, uneven = hair_random(b), b.input("Random Roughness")
     roughness, huang = b.op("vary", b.input("Roughness"), random, uneven), b.node.model == "HUANG"
     radial = roughness if huang else b.op("vary", b.input("Radial Roughness"), random, uneven)
     absorption = hair_absorption(b, random, radial)
@@ -293,6 +294,16 @@ def principled_hair(b, weight):
         b.op("hair_huang", weight, absorption, roughness, offset, ior, b.input("Aspect Ratio"), *parts, along)
     else:
         b.op("hair_chiang", weight, absorption, roughness, radial, b.input("Coat"), offset, ior, along, met)
+
+
+def hair_random(b):
+    """Where nothing is linked, each strand's own number; on meshes, which have none, the socket's."""
+    given = b.input("Random")
+    if b.linked("Random"):
+        return given
+    slot = b.attribute(STRAND_RANDOM)
+    more = b.op("math_subtract", b.op("attribute", imm=(slot,))[1], given)
+    return b.op("math_add", given, b.op("math_multiply", more, b.op("has_attribute", imm=(slot,))))
 
 
 def hair_absorption(b, random, radial):

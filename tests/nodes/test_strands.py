@@ -6,6 +6,8 @@ import bpy
 import numpy as np
 import pytest
 
+from gi_engine.nodes.attributes import STRAND_RANDOM
+
 SHAPES = ("RIBBONS", "THICK", "THICK_LINEAR")
 CURVES_INFO = ("Is Strand", "Intercept", "Length", "Thickness", "Tangent Normal", "Random")
 GEOMETRY = ("Position", "Normal", "Tangent", "True Normal", "Incoming", "Parametric", "Backfacing")
@@ -253,3 +255,16 @@ def test_bumps_on_curves(stage):
     stage.show(bump.outputs["Normal"])
     cycles, ours = stage.cycles(), stage.ours()
     assert np.median(np.abs(cycles - ours)) < 2e-2
+
+
+@pytest.mark.parametrize("linked", (False, True))
+def test_principled_hair_varies_by_strand_unless_told_otherwise(stage, linked):
+    add_curves(stage)
+    hair = stage.new("ShaderNodeBsdfHairPrincipled", parametrization="MELANIN")
+    hair.inputs["Random Color"].default_value = 1.0
+    if linked:
+        stage.link(stage.new("ShaderNodeValue").outputs[0], hair.inputs["Random"])
+    stage.link(hair.outputs[0], stage.tree.get_output_node("CYCLES").inputs["Surface"])
+    stage.ours()
+    names = {attribute.name for attribute in stage.exported.meshes[0].attributes}
+    assert (STRAND_RANDOM in names) is not linked
