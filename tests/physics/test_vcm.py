@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from agreement_scenes import CAUSTICS, SCENES
+from agreement_scenes import CAUSTICS, SCENES, STRANDS
 from light_scenes import lamp, matrix
 from test_closed_forms import glass, quad, scene_of, shiny, sphere, surface
 from test_photons import ALIKE, SEEDS, blocks_of, shoot
@@ -41,6 +41,12 @@ def test_without_connections_it_is_progressive_photon_mapping(name):
 def test_all_terms_agree_with_bidirectional_path_tracing(name):
     """Pixels of 1/32 of the picture: discs of one pixel are cut at every edge."""
     assert_agree(blocks_of(ALL[name], "bdpt", 16), blocks_of(ALL[name], "vcm", 16, radius=1), 0.003)
+
+
+@pytest.mark.parametrize("name", STRANDS)
+def test_strands_that_no_photon_lies_on_agree_too(name):
+    """Discs of a tenth of a pixel: on the surfaces beside fibres they are cut nearly everywhere."""
+    assert_agree(blocks_of(STRANDS[name], "path", 64), blocks_of(STRANDS[name], "vcm", 16, radius=0.1), 0.003)
 
 
 def test_it_sees_in_a_mirror_what_a_mirror_throws():
