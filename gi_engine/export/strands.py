@@ -27,6 +27,7 @@ class CurveStyle:
     shape: str = "RIBBON"
     subdivisions: int = 2
     is_render: bool = True
+    may_be_straight: bool = True  # whether curves that are polygons are traced as such
 
 
 def curve_style(scene, is_render: bool) -> CurveStyle:
@@ -34,7 +35,8 @@ def curve_style(scene, is_render: bool) -> CurveStyle:
     curves = getattr(scene, "cycles_curves", None)
     if curves is None:
         return CurveStyle(is_render=is_render)
-    return CurveStyle(SHAPES.get(curves.shape, "RIBBON"), curves.subdivisions, is_render)
+    straight = "THICK_LINEAR" in curves.bl_rna.properties["shape"].enum_items  # not yet in Blender 4.5
+    return CurveStyle(SHAPES.get(curves.shape, "RIBBON"), curves.subdivisions, is_render, straight)
 
 
 @dataclass
@@ -102,7 +104,13 @@ def export_strands(source, name: str, wanted: set[str], style: CurveStyle) -> St
     if "" in wanted and uv and uv not in wanted:
         attributes.append(Attribute(uv, "FACE", read_attribute(source.attributes[uv])))
     kind = source.attributes.get("curve_type")
-    straight = kind is not None and kind.domain == "CURVE" and len(kind.data) and kind.data[0].value == POLY
+    straight = (
+        style.may_be_straight
+        and kind is not None
+        and kind.domain == "CURVE"
+        and len(kind.data)
+        and kind.data[0].value == POLY
+    )
     shape = "THICK_LINEAR" if straight else style.shape
     return Strands(name, shape, positions, radius, first, style.subdivisions, attributes, uv, OBJECT_SPACE)
 

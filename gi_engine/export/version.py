@@ -36,3 +36,8 @@ def undisplaced_steps_differ() -> bool:
 def tangents_are_undisplaced() -> bool:
     """Up to Blender 4.5 true displacement leaves the tangents of UV maps as they were."""
     return bpy.app.version < (5, 0, 0)
+
+
+def thickness_is_unscaled() -> bool:
+    """Up to Blender 4.5 the thickness of curves, which their nodes ask for, is that of the object before it is scaled."""
+    return bpy.app.version < (5, 0, 0)

@@ -261,6 +261,8 @@ def particle_info(b):
 @rule("ShaderNodeHairInfo")
 def curves_info(b):
     """Zeros on meshes, as in Cycles."""
+    from ..export.version import thickness_is_unscaled  # needs bpy
+
     b.output("Is Strand", b.op("strand")[2])
     for name, attribute in {
         "Intercept": STRAND_INTERCEPT,
@@ -269,14 +271,14 @@ def curves_info(b):
     }.items():
         if b.wants(name):
             b.output(name, named(b, attribute)[1])
-    _, thickness, normal = b.op("strand_place")
+    _, thickness, normal = b.op("strand_place", imm=(thickness_is_unscaled(),))
     b.output("Thickness", thickness)
     b.output("Tangent Normal", normal)
 
 
 @rule("ShaderNodePointInfo")
 def point_info(b):
-    center, thickness, _ = b.op("strand_place")
+    center, thickness, _ = b.op("strand_place", imm=(0,))
     is_point = b.op("math_subtract", b.constant(1.0), b.op("strand")[2])
     b.output("Position", b.op("vector_scale", center, is_point))
     b.output("Radius", b.op("math_multiply", thickness, b.op("math_multiply", is_point, b.constant(0.5))))

@@ -8,7 +8,7 @@ import pytest
 
 from gi_engine.nodes.attributes import STRAND_RANDOM
 
-SHAPES = ("RIBBONS", "THICK", "THICK_LINEAR")
+SHAPES = ("RIBBONS", "THICK", *(("THICK_LINEAR",) if bpy.app.version >= (5, 0, 0) else ()))
 CURVES_INFO = ("Is Strand", "Intercept", "Length", "Thickness", "Tangent Normal", "Random")
 GEOMETRY = ("Position", "Normal", "Tangent", "True Normal", "Incoming", "Parametric", "Backfacing")
 COORDINATES = ("Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection")

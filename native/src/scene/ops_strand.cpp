@@ -24,13 +24,13 @@ void strand(const Operands& o, ShadeState& s) {
   o.set(0, (v[1] - v[0]) * side), o.set(1, (v[2] - v[0]) * side);
 }
 
-// -> middle, diameter, normal across the view; of strands and points, zeros on meshes
+// -> middle, diameter (immediate: whether in object space), normal across the view; of strands and points, zeros on meshes
 void strand_place(const Operands& o, ShadeState& s) {
   o.set(0, Vec3{}), o.set(1, 0.0f), o.set(2, Vec3{});
   if (!instance_of(s) || s.point.strand == kNoId) return;
   const auto place = s.resources.scene->strand_place(s.point);
   const Vec3 wo = s.point.wo, along = place.along;
-  o.set(0, place.center), o.set(1, place.thickness);
+  o.set(0, place.center), o.set(1, o.imm(3) ? place.own_thickness : place.thickness);
   if (!(along == Vec3{})) o.set(2, normalize(wo - along * (dot(along, wo) / length_squared(along))));
 }
 
@@ -43,7 +43,7 @@ void along_strand(const Operands& o, ShadeState& s) {
 const Op kOps[] = {
     {"along_strand", "v", "v", 0, OpKind::kContext, along_strand},
     {"strand", "vvff", "", 0, OpKind::kContext, strand},
-    {"strand_place", "vfv", "", 0, OpKind::kContext, strand_place},
+    {"strand_place", "vfv", "", 1, OpKind::kContext, strand_place},
 };
 
 }  // namespace

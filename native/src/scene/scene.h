@@ -117,7 +117,7 @@ class Scene {
   // A strand's own at the point, in world space: towards its tip and, where that is asked for, as thick as it is (metres).
   struct StrandPlace {
     Vec3 center, along;
-    float thickness = 0;
+    float thickness = 0, own_thickness = 0;  // metres; in object space
   };
   StrandPlace strand_place(const ShadingPoint& point) const;
   bool is_ribbon(const ShadingPoint& point) const { return point.strand != kNoId && strands_[point.mesh]->is_ribbon(); }

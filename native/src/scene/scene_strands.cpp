@@ -60,8 +60,9 @@ Scene::StrandPlace Scene::strand_place(const ShadingPoint& point) const {
   // Where the matrix scales unevenly, by the mean over the axes.
   constexpr float kAxis = 0.57735027f;
   const float scale = length(placed.to_world.vector({kAxis, kAxis, kAxis}));
+  const float thickness = 2.0f * strands.radius(point.triangle, point.b1);
   return {placed.to_world.point(strands.center(point.triangle, point.b1)),
-          placed.to_world.vector(strands.derivative(point.triangle, point.b1)), 2.0f * strands.radius(point.triangle, point.b1) * scale};
+          placed.to_world.vector(strands.derivative(point.triangle, point.b1)), thickness * scale, thickness};
 }
 
 }  // namespace gi
