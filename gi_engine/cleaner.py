@@ -5,6 +5,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+from . import log
+
 
 class Cleaner:
     """The thread is there only while there is work."""
@@ -29,7 +31,10 @@ class Cleaner:
                 if work is None:
                     self._thread = None
                     return
-            work()
+            try:
+                work()
+            except Exception:  # what waits for this thread must not wait for ever
+                log.logger.exception("denoising the viewport failed")
 
     def wait(self) -> None:
         """Until nothing is at work."""

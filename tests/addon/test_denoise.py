@@ -8,6 +8,7 @@ import pytest
 
 from gi_engine import engine
 from gi_engine.bake import blender_folders
+from gi_engine.cleaner import Cleaner
 from gi_engine.denoise import Stopped, denoise
 
 from .conftest import add, mesh
@@ -59,3 +60,12 @@ def test_it_can_be_stopped():
         with pytest.raises(Stopped):
             denoise(pixels, {}, blender_folders(), stopped=lambda a=again, n=last: a.append(1) or len(a) >= n)
         assert len(again) < len(asked)
+
+
+def test_the_denoising_thread_outlives_work_that_fails():
+    cleaner, done = Cleaner(), []
+    cleaner.submit(lambda: 1 / 0)
+    cleaner.wait()
+    cleaner.submit(lambda: done.append(1))
+    cleaner.wait()
+    assert done == [1]
