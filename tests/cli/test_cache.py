@@ -10,7 +10,7 @@ import pytest
 from gi_engine import cli, content, kept_file
 from gi_engine import scene_data as sd
 
-VERSION = 4  # of the tables of irradiance records
+VERSION = 5  # of the tables of irradiance records
 HERE = ("--integrator", "irradiance_cache", "--set", "record_samples=64", "--resolution", "32x32")
 
 
@@ -68,8 +68,8 @@ def test_a_cache_is_kept_and_taken_over(gi, room, tmp_path):
     before = kept_file.read(cache, "irradiance_cache", VERSION).tables["bounce 1"]
     assert records(gi("render", file, "-o", out, "--cache", cache, *HERE)) == records(again)
     after = kept_file.read(cache, "irradiance_cache", VERSION).tables["bounce 1"]
-    assert (after[:, -2] >= before[:, -2]).all()  # rays of each record, in portions
-    assert after[:, -2].sum() > before[:, -2].sum()
+    assert (after[:, -3] >= before[:, -3]).all()  # rays of each record, in portions
+    assert after[:, -3].sum() > before[:, -3].sum()
     assert sorted(p.name for p in tmp_path.iterdir() if "blend" not in p.name) == ["light.cache", "out.exr"]
     # Seen from elsewhere it grows.
     assert records(gi("render", turned, "-o", out, "--cache", cache, *HERE)) > records(again)

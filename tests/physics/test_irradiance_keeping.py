@@ -108,9 +108,9 @@ def test_records_near_moved_objects_are_dropped():
 def test_tables_of_something_else_are_refused():
     _, kept, _ = render(room(), eye(0), samples=1)
     for name, table, message in (
-        ("photons", np.zeros((2, 37), np.float32), "is no table of irradiance records"),
-        ("bounce 1", np.zeros((2, 35), np.float32), "is no table of irradiance records"),
-        ("bounce 1", np.full((2, 37), np.nan, np.float32), "row 0: no irradiance record"),
+        ("photons", np.zeros((2, 38), np.float32), "is no table of irradiance records"),
+        ("bounce 1", np.zeros((2, 37), np.float32), "is no table of irradiance records"),
+        ("bounce 1", np.full((2, 38), np.nan, np.float32), "row 0: no irradiance record"),
     ):
         with pytest.raises(RuntimeError, match=message):
             render(room(), eye(0), {**kept, name: table})

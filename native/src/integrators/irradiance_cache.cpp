@@ -253,7 +253,7 @@ const Descriptor& irradiance_cache_descriptor() {
       },
       [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<IrradianceCacheIntegrator>(p); },
       /*bakes=*/false,
-      /*kept_version=*/4,
+      /*kept_version=*/5,
       /*kept_by_place=*/true,
       kCarriesAbsorption | kCarriesPortals | kCarriesStrands};
   return descriptor;

@@ -485,8 +485,8 @@ const Descriptor& photon_map_descriptor() {
           {"caustics_refractive", "Refractive Caustics", Kind::kBool, 1, 0, 1, "Glass seen by diffuse surfaces"},
       },
       [](const Parameters& p) -> std::unique_ptr<Integrator> { return std::make_unique<PhotonMapIntegrator>(p); },
-      false,
-      1};
+      /*bakes=*/false,
+      /*kept_version=*/2};
   return descriptor;
 }
 

@@ -1,8 +1,12 @@
 // Irradiance and its gradients from one stratified hemisphere of rays.
 #include "transport/irradiance_gather.h"
 
+#include <algorithm>
+
 namespace gi {
 namespace {
+
+constexpr int kOfAll = 10;  // rays, of which one may meet something nearer than the wall
 
 // Polar angle of the boundary between ring j − 1 and ring j: rings are equal in sin² θ.
 struct Boundary {
@@ -34,6 +38,7 @@ GatheredIrradiance gather_irradiance(Vec3 position, Vec3 normal, int samples, co
   GatheredIrradiance result;
   Rgb sum;
   float inverse_distances = 0.0f;
+  std::vector<float> distances;
   for (int j = 0; j < rings; ++j) {
     for (int k = 0; k < sectors; ++k) {
       const int index = j * sectors + k;
@@ -43,7 +48,7 @@ GatheredIrradiance gather_irradiance(Vec3 position, Vec3 normal, int samples, co
       GatheredRay& r = at(j, k) = ray(index, frame.to_world({s * std::cos(phi), s * std::sin(phi), safe_sqrt(1.0f - sin2)}));
       sum += r.radiance;
       inverse_distances += 1.0f / std::max(r.distance, 1e-6f);
-      result.nearest = std::min(result.nearest, r.distance);
+      distances.push_back(r.distance);
     }
   }
 
@@ -51,7 +56,10 @@ GatheredIrradiance gather_irradiance(Vec3 position, Vec3 normal, int samples, co
   record.position = position, record.normal = normal;
   record.irradiance = sum * (kPi / float(strata.count()));
   record.radius = inverse_distances > 0.0f ? float(strata.count()) / inverse_distances : kInf;
-  result.nearest *= strata.least_aim();
+  const auto near = distances.begin() + strata.count() / kOfAll;
+  std::nth_element(distances.begin(), near, distances.end());
+  result.wall = *near;
+  result.nearest = *std::min_element(distances.begin(), near + 1) * strata.least_aim();
 
   for (int j = 0; j < rings; ++j)
     for (int k = 0; k < sectors; ++k) result.variance += 0.5f * sqr(luminance(at(j, k).radiance) - luminance(at(j, k - 1).radiance));

@@ -22,10 +22,11 @@ struct HemisphereStrata {
   float least_aim() const { return std::sqrt(1.0f - 1.0f / float(rings)) * std::max(std::cos(2.0f * kPi / float(sectors)), 0.5f); }
 };
 
-// What rays see from a place: irradiance, its gradients, and the harmonic mean and least of the distances.
+// What rays see from a place: irradiance, its gradients, and how far off things are.
 struct GatheredIrradiance {
   IrradianceRecord record;  // its radius is the harmonic mean
   float nearest = kInf;  // metres; no wall is nearer
+  float wall = kInf;     // metres, to what is no mere chair's leg: a tenth of the rays meet something nearer
   float variance = 0;    // of the irradiance's luminance, (W/m²)²: by differences of neighbouring strata, rather too much
 };
 

@@ -48,13 +48,13 @@ void IrradianceLevel::insert(const IrradiancePlace& place, const GatheredIrradia
   const IrradianceRecord record = settled(place, gathered);
   cache_.insert(record);
   growth_.push_back({place});
-  gathered_.push_back({record, gathered.variance});
+  gathered_.push_back({record, gathered.variance, gathered.wall});
 }
 
 void IrradianceLevel::improve(size_t index, const GatheredIrradiance& gathered) {
   IrradianceRecord more = gathered.record;
   temper(more, cache_.records()[index].radius);
-  auto& [light, variance] = gathered_[index];
+  auto& [light, variance, wall] = gathered_[index];
   const float share = 1.0f / ++growth_[index].gathers;
   for_each_colour(light, more, [&](Rgb& mean, Rgb value) { mean += (value - mean) * share; });
   variance = variance * sqr(1.0f - share) + gathered.variance * sqr(share);
@@ -63,7 +63,7 @@ void IrradianceLevel::improve(size_t index, const GatheredIrradiance& gathered) 
 
 void IrradianceLevel::smooth(ThreadPool& pool, const std::atomic<bool>& cancelled, int pass, size_t first) {
   if (first >= size()) return;
-  if (!smoothing_.serves(size(), first)) smoothing_ = IrradianceSmoothing(cache_, first, pool, cancelled);
+  if (!smoothing_.serves(size(), first)) smoothing_ = IrradianceSmoothing(cache_, gathered_, first, pool, cancelled);
   if (cancelled) return;
   pool.for_each(int((size() + kBatch - 1) / kBatch), cancelled, [&](int batch) {
     for (size_t i = std::max(first, size_t(batch) * kBatch); i < std::min(size(), size_t(batch + 1) * kBatch); ++i) {
@@ -98,7 +98,7 @@ std::vector<float> IrradianceLevel::rows(int passes) const {
     record.write(row);
     row += IrradianceRecord::kNumbers;
     for (int k = 0; k < 3; ++k) row[k] = g.place.ng[k];
-    row[3] = g.place.footprint, row[4] = g.place.spread, row[5] = g.gathers, row[6] = gathered_[i].variance;
+    row[3] = g.place.footprint, row[4] = g.place.spread, row[5] = g.gathers, row[6] = gathered_[i].variance, row[7] = gathered_[i].wall;
   }
   return rows;
 }
@@ -109,7 +109,7 @@ void IrradianceLevel::check(const std::vector<float>& rows, const std::string& n
     const float* more = &rows[begin + IrradianceRecord::kNumbers];
     bool good = r.radius > 0.0f && r.least >= 0.0f && r.reach > 0.0f && std::isfinite(r.radius) && is_finite(r.irradiance) &&
                 std::isfinite(length_squared(r.position)) && std::abs(length_squared(r.normal) - 1.0f) < 1e-3f && more[5] >= 1.0f &&
-                more[6] >= 0.0f;
+                more[6] >= 0.0f && more[7] >= 0.0f;
     for (int axis = 0; axis < 3; ++axis) good = good && is_finite(r.translation[axis]) && is_finite(r.lateral[axis]);
     for (int k = 0; k < 7; ++k) good = good && std::isfinite(more[k]);
     require(good, "'" + name + "', row " + std::to_string(begin / kColumns) + ": no irradiance record");
@@ -127,7 +127,7 @@ void IrradianceLevel::take_over(const std::vector<float>& rows, bool fixed) {
     const float* more = &rows[begin + IrradianceRecord::kNumbers];
     cache_.insert(r);
     growth_.push_back({{r.position, {more[0], more[1], more[2]}, r.normal, more[3], more[4]}, more[5], fixed});
-    gathered_.push_back({r, more[6]});
+    gathered_.push_back({r, more[6], more[7]});
   }
 }
 

@@ -23,7 +23,7 @@ struct IrradianceSpacing {
 
 class IrradianceLevel {
  public:
-  static constexpr size_t kColumns = IrradianceRecord::kNumbers + 7;
+  static constexpr size_t kColumns = IrradianceRecord::kNumbers + 8;
 
   IrradianceLevel(Bounds bounds, float error, IrradianceSpacing spacing, float smoothing)
       : cache_(bounds, error), spacing_(spacing), strength_(smoothing) {}

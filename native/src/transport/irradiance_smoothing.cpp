@@ -12,35 +12,41 @@ constexpr size_t kSteps[] = {1, 4, 12, 36};  // records of the means that are tr
 constexpr size_t kJudges = 12;               // records whose mean variance is taken for that of each
 constexpr float kAlone = 2.0f;               // times as far off a record alone may be: its noise has a long tail
 constexpr float kSameSide = 0.9f;            // cosine between normals
+constexpr float kOfWall = 1.0f / 3.0f;       // of the distance to walls: how far records may lie apart
 constexpr float kFlat = 0.15f;               // of the distance: how far from the tangent plane
 constexpr int kBatch = 256;
 
-// Metres within which a record may be evened out with another of which the same holds.
-float reach_of(const IrradianceRecord& r, float overlap) { return std::max(r.reach, overlap * r.radius); }
-
-bool are_of_one_surface(const IrradianceRecord& a, const IrradianceRecord& b, float overlap) {
+bool are_of_one_surface(const IrradianceRecord& a, const IrradianceRecord& b, float reach) {
   const Vec3 d = b.position - a.position;
-  const float distance = length(d), seen = std::min(a.reach, b.reach), held = overlap * std::min(a.radius, b.radius);
-  return distance <= std::max(seen, held) && dot(a.normal, b.normal) > kSameSide &&
+  const float distance = length(d);
+  return distance <= reach && dot(a.normal, b.normal) > kSameSide &&
          std::abs(dot(d, a.normal)) + std::abs(dot(d, b.normal)) <= 2.0f * kFlat * distance;
 }
 
 }  // namespace
 
-IrradianceSmoothing::IrradianceSmoothing(const IrradianceCache& cache, size_t first, ThreadPool& pool, const std::atomic<bool>& cancelled)
+IrradianceSmoothing::IrradianceSmoothing(const IrradianceCache& cache, const std::vector<Gathered>& gathered, size_t first,
+                                         ThreadPool& pool, const std::atomic<bool>& cancelled)
     : first_(first) {
   const std::vector<IrradianceRecord>& records = cache.records();
   std::vector<Vec3> positions;
   for (const IrradianceRecord& r : records) positions.push_back(r.position);
   const PointTree tree(positions, pool);
   const float overlap = IrradianceCache::kOverlap * cache.error();
+  // Metres: things nearer than that hide no more than a little of what is seen.
+  const auto clear_of_walls = [&](size_t k) { return std::max(records[k].reach, kOfWall * gathered[k].wall); };
   std::vector<std::vector<uint32_t>> found(records.size());
   pool.for_each(int((records.size() + kBatch - 1) / kBatch), cancelled, [&](int batch) {
     std::vector<PointTree::Found> near;
     for (size_t i = std::max(first, size_t(batch) * kBatch); i < std::min(records.size(), size_t(batch + 1) * kBatch); ++i) {
-      const auto accepts = [&](uint32_t k) { return are_of_one_surface(records[i], records[tree.order()[k]], overlap); };
-      const float farthest = 1.001f * reach_of(records[i], overlap);
-      tree.nearest(records[i].position, std::end(kSteps)[-1], sqr(farthest), near, accepts);
+      const IrradianceRecord& own = records[i];
+      const auto accepts = [&](uint32_t k) {
+        const uint32_t other = tree.order()[k];
+        const float seen = std::min(clear_of_walls(i), clear_of_walls(other)), held = overlap * std::min(own.radius, records[other].radius);
+        return are_of_one_surface(own, records[other], std::max(seen, held));
+      };
+      const float farthest = 1.001f * std::max(clear_of_walls(i), overlap * own.radius);
+      tree.nearest(own.position, std::end(kSteps)[-1], sqr(farthest), near, accepts);
       for (PointTree::Found& f : near) f.point = tree.order()[f.point];
       std::sort(near.begin(), near.end(), [&](const auto& a, const auto& b) {
         if ((a.point == i) != (b.point == i)) return a.point == i;

@@ -12,11 +12,13 @@ class IrradianceSmoothing {
   struct Gathered {
     IrradianceRecord light;
     float variance = 0;  // of the irradiance's luminance, (W/m²)²
+    float wall = kInf;   // metres, to what takes up some part of its view
   };
 
   IrradianceSmoothing() = default;
-  // Finds the neighbours of all records from `first` on: on the same surface, and nearer than anything that either of them sees.
-  IrradianceSmoothing(const IrradianceCache& cache, size_t first, ThreadPool& pool, const std::atomic<bool>& cancelled);
+  // Finds the neighbours of all records from `first` on: on the same surface, and nearer than walls that either of them sees.
+  IrradianceSmoothing(const IrradianceCache& cache, const std::vector<Gathered>& gathered, size_t first, ThreadPool& pool,
+                      const std::atomic<bool>& cancelled);
 
   // Whether it knows the neighbours of all but the `first` of so many records.
   bool serves(size_t records, size_t first) const { return begin_.size() == records + 1 && first_ <= first; }
