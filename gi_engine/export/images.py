@@ -54,14 +54,33 @@ def read_image(image, warn, user=None) -> list[Image]:
 def read_frame(image, warn, user) -> list[Image]:
     if image.source == "SEQUENCE":
         return [read_file(image, sequence_path(absolute(image), current_frame(image, user)), None, warn)]
-    if image.source == "MOVIE" and current_frame(image, user) != 1:
-        warn(f"image '{image.name}' is a movie; its first frame is shown")
     path = absolute(image)
+    if image.source == "MOVIE":
+        return [read_movie(image, current_frame(image, user), warn, path)]
     if image.source == "FILE" and not image.is_dirty and not (image.packed_file and is_premultiplied(image)):
         pixels = bytes_of_file(path, image.packed_file.data if image.packed_file else None)
         if pixels is not None:
             return [from_file_bytes(image, pixels)]
     return [read_datablock(image, image.name, warn, path)]
+
+
+def read_movie(image, frame: int, warn, path: str) -> Image:
+    """Scripts see the frame that was last looked at, whoever did: here a texture does."""
+    stays = image.has_data
+    try:
+        texture = bpy.data.textures.new("frame of a movie", "IMAGE")
+    except (RuntimeError, AttributeError):  # where Blender lets nothing be made
+        warn(f"image '{image.name}' is a movie; the frame that Blender has shown last is shown")
+        return read_datablock(image, image.name, warn, path)
+    try:
+        texture.image = image.original
+        texture.image_user.frame_current = frame
+        texture.evaluate((0.0, 0.0, 0.0))
+        return read_datablock(image, image.name, warn, path)
+    finally:
+        bpy.data.textures.remove(texture)
+        if not stays:
+            image.buffers_free()
 
 
 def read_tiles(image, warn) -> list[Image]:

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from .. import native
-from ..nodes.attributes import STRAND_INTERCEPT, STRAND_LENGTH, STRAND_RANDOM, UNDEFORMED
+from ..nodes.attributes import STRAND_INTERCEPT, STRAND_LENGTH, STRAND_NORMAL, STRAND_RANDOM, UNDEFORMED
 from ..scene_data import Attribute, Strands
 from .arrays import read, read_attribute
 
@@ -100,6 +100,8 @@ def export_strands(source, name: str, wanted: set[str], style: CurveStyle) -> St
     first = read(source.curve_offset_data, "value", 1, np.int32)
     radius = read_radius(source, len(positions), CURVE_RADIUS)
     attributes = list(read_attributes(source, wanted)) + own_attributes(positions, first, wanted, 0)
+    if STRAND_NORMAL in wanted:
+        attributes.append(Attribute(STRAND_NORMAL, "POINT", read_normals(source)))
     uv = first_uv_map(source)
     if "" in wanted and uv and uv not in wanted:
         attributes.append(Attribute(uv, "FACE", read_attribute(source.attributes[uv])))
@@ -120,6 +122,11 @@ def read_radius(source, count: int, default: float) -> np.ndarray:
     if radius is None or radius.domain != "POINT" or radius.data_type != "FLOAT":
         return np.full(count, default, np.float32)
     return read(radius.data, "value", 1, np.float32)
+
+
+def read_normals(source) -> np.ndarray:
+    """One by one: Blender makes them for a loop and frees them after it, before foreach_get would read them."""
+    return np.array([tuple(normal.vector) for normal in source.normals], np.float32).reshape(-1, 3)
 
 
 def read_attributes(source, wanted: set[str]):

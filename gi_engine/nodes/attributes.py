@@ -14,6 +14,7 @@ VERTEX_NORMAL = (
 ISLAND = ".island"  # a random number for each part of the mesh that hangs together
 # How far along its curve a point is (0 to 1), the curve's length (metres, object space), a random number of a curve or point.
 STRAND_INTERCEPT, STRAND_LENGTH, STRAND_RANDOM = ".strand_intercept", ".strand_length", ".strand_random"
+STRAND_NORMAL = ".strand_normal"  # of a curve's points, object space
 # What each place of an instance knows: coordinates where its instancer made it, and its particle.
 INSTANCER_GENERATED, INSTANCER_UV = "\x02generated", "\x02uv"
 PARTICLE_STATE = "\x02particle state"  # index, random, age; lifetime

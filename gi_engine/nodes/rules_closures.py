@@ -5,7 +5,7 @@ Normal and Coat Normal that are not linked are the zero vector, which the ops ta
 
 from __future__ import annotations
 
-from .attributes import STRAND_RANDOM
+from .attributes import STRAND_NORMAL, STRAND_RANDOM
 from .program import Value
 from .rules import closure_rule
 from .rules_input import surface_tangent
@@ -283,7 +283,7 @@ def hair(b, weight):
 
 @closure_rule("ShaderNodeBsdfHairPrincipled")
 def principled_hair(b, weight):
-    along, _, _, met = b.op("strand")
+    along, _, is_strand, met = b.op("strand")
     random, uneven = hair_random(b), b.input("Random Roughness")
     roughness, huang = b.op("vary", b.input("Roughness"), random, uneven), b.node.model == "HUANG"
     radial = roughness if huang else b.op("vary", b.input("Radial Roughness"), random, uneven)
@@ -291,7 +291,12 @@ def principled_hair(b, weight):
     offset, ior = b.input("Offset"), b.input("IOR")
     if huang:
         parts = [b.input(name) for name in ("R lobe", "TT lobe", "TRT lobe")]
-        b.op("hair_huang", weight, absorption, roughness, offset, ior, b.input("Aspect Ratio"), *parts, along)
+        aspect = b.input("Aspect Ratio")
+        round_one = number(b, aspect) == 1.0
+        own_normal = NONE if round_one else b.op("attribute", imm=(b.attribute(STRAND_NORMAL),))[0]
+        place = along, met, is_strand, b.op("strand_place", imm=(0,))[1], own_normal
+        name = "hair_huang" if round_one else "hair_huang_elliptic"
+        b.op(name, weight, absorption, roughness, offset, ior, aspect, *parts, *place)
     else:
         b.op("hair_chiang", weight, absorption, roughness, radial, b.input("Coat"), offset, ior, along, met)
 

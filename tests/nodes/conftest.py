@@ -92,6 +92,10 @@ class Stage:
     def cycles(self) -> np.ndarray:
         self.scene.render.engine = "CYCLES"
         bpy.ops.render.render(write_still=True)
+        return self.rendered()
+
+    def rendered(self) -> np.ndarray:
+        """What was written last."""
         image = bpy.data.images.load(str(self.path))
         image.colorspace_settings.name = "Non-Color"
         pixels = np.empty(SIZE * SIZE * 4, np.float32)

@@ -185,6 +185,108 @@ def test_frames_of_a_sequence(tmp_path):
     assert len(keys) == 3
 
 
+FRAMES = 6
+
+
+def write_movie(folder):
+    """Of frames that are each darker than the one before."""
+    scene = bpy.data.scenes.new("Cut")
+    editor = scene.sequence_editor_create()
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences
+    for frame in range(1, FRAMES + 1):
+        write_png(folder / f"f_{frame}.png", (240 - 30 * frame, 60, 100, 255), (32, 32))
+    strip = strips.new_image("frames", str(folder / "f_1.png"), 1, 1)
+    for frame in range(2, FRAMES + 1):
+        strip.elements.append(f"f_{frame}.png")
+    strip.frame_final_duration = scene.frame_end = FRAMES
+    render = scene.render
+    render.resolution_x = render.resolution_y = 32
+    if hasattr(render.image_settings, "media_type"):
+        render.image_settings.media_type = "VIDEO"
+    render.image_settings.file_format, render.filepath = "FFMPEG", str(folder / "movie.mp4")
+    render.ffmpeg.format, render.ffmpeg.codec, render.ffmpeg.constant_rate_factor = "MPEG4", "H264", "HIGH"
+    scene.view_settings.view_transform = "Standard"
+    bpy.ops.render.render(animation=True, scene=scene.name)
+    bpy.data.scenes.remove(scene)
+    return folder / "movie.mp4"
+
+
+MOVIE_SETTINGS = {
+    "from the first frame": {},
+    "later": {"frame_start": 3},
+    "offset": {"frame_offset": 2},
+    "shorter": {"frame_duration": 3},
+    "over and over": {"frame_duration": 3, "use_cyclic": True},
+    "of one frame": {"frame_duration": 1},
+}
+
+
+@pytest.mark.parametrize("key", MOVIE_SETTINGS)
+def test_frames_of_a_movie_are_cycles(key, tmp_path):
+    path = write_movie(tmp_path)
+    for image in list(bpy.data.images):
+        bpy.data.images.remove(image)
+    image = bpy.data.images.load(str(path))
+    assert image.source == "MOVIE" and image.frame_duration == FRAMES
+    node = shown_to_cycles(image)
+    user = node.image_user
+    user.frame_duration, user.frame_start = FRAMES, 1
+    for name, value in MOVIE_SETTINGS[key].items():
+        setattr(user, name, value)
+    reds = []
+    for frame in (1, 2, 5, 9):
+        bpy.context.scene.frame_set(frame)
+        theirs = seen_by_cycles(tmp_path / "cycles.exr")
+        tile, warnings = read(image, user)
+        assert not warnings and not bpy.data.textures
+        ours = srgb_to_linear(tile.pixels[16, 16, :3] / 255.0)
+        np.testing.assert_allclose(ours, theirs, atol=2e-3)
+        reds.append(ours[0])
+    assert np.ptp(reds) > 0.1 or key == "of one frame"
+
+
+def srgb_to_linear(encoded):
+    return np.where(encoded < 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+
+
+def shown_to_cycles(image):
+    """A square that fills the view and glows with the image."""
+    scene = bpy.context.scene
+    mesh = bpy.data.meshes.new("square")
+    mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
+    mesh.uv_layers.new(name="UVMap")
+    scene.collection.objects.link(bpy.data.objects.new("square", mesh))
+    material = bpy.data.materials.new("glow")
+    mesh.materials.append(material)
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    node, glow, end = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("TexImage", "Emission", "OutputMaterial"))
+    node.image = image
+    tree.links.new(node.outputs[0], glow.inputs[0])
+    tree.links.new(glow.outputs[0], end.inputs[0])
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale, camera.location = "ORTHO", 1.0, (0, 0, 3)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    return node
+
+
+def seen_by_cycles(path):
+    scene = bpy.context.scene
+    scene.render.engine, scene.cycles.samples = "CYCLES", 1
+    scene.cycles.use_denoising = scene.render.use_sequencer = False
+    scene.render.resolution_x = scene.render.resolution_y = 4
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_depth, scene.render.filepath = "OPEN_EXR", "32", str(path)
+    bpy.ops.render.render(write_still=True)
+    picture = bpy.data.images.load(str(path))
+    color = np.array(picture.pixels[:3])
+    bpy.data.images.remove(picture)
+    return color
+
+
 def test_udim_tiles(tmp_path):
     for number, red in ((1001, 10), (1002, 20), (1011, 30)):
         write_png(tmp_path / f"t.{number}.png", (red, 0, 0, 255))

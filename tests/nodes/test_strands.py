@@ -268,3 +268,50 @@ def test_principled_hair_varies_by_strand_unless_told_otherwise(stage, linked):
     stage.ours()
     names = {attribute.name for attribute in stage.exported.meshes[0].attributes}
     assert (STRAND_RANDOM in names) is not linked
+
+
+def add_broken_curves(stage, to_points=True):
+    """Sound curves, and some whose points lie on one another: two of them, the ends, or (`to_points`) all."""
+    data = add_curves(stage, keys=KEYS, count=8).data
+    places = np.empty(3 * len(data.points), np.float32)
+    data.attributes["position"].data.foreach_get("vector", places)
+    places = places.reshape(-1, 3)
+    for number, curve in enumerate(data.curves):
+        first, count = curve.first_point_index, curve.points_length
+        if number % 4 == 1:
+            places[first + 2] = places[first + 1]
+        elif number % 4 == 2:
+            places[first + 1], places[first + count - 2] = places[first], places[first + count - 1]
+        elif number % 4 == 3 and to_points:
+            places[first : first + count] = places[first]
+    data.attributes["position"].data.foreach_set("vector", places.ravel())
+
+
+@pytest.mark.parametrize("output", ("Tangent", "Normal", "True Normal", "Parametric"))
+@pytest.mark.parametrize("shape", SHAPES)
+def test_curves_whose_points_lie_on_one_another(stage, shape, output):
+    add_broken_curves(stage, to_points=output != "Tangent")  # which has no direction there, in Cycles any
+    stage.scene.cycles_curves.shape = shape
+    stage.show(stage.new("ShaderNodeNewGeometry").outputs[output])
+    check(stage)
+
+
+@pytest.mark.parametrize("model", ("CHIANG", "HUANG", "STRAND"))
+@pytest.mark.parametrize("shape", SHAPES)
+def test_fibres_whose_points_lie_on_one_another_are_rendered(stage, shape, model):
+    add_broken_curves(stage)
+    stage.scene.cycles_curves.shape = shape
+    kind = "ShaderNodeBsdfHair" if model == "STRAND" else "ShaderNodeBsdfHairPrincipled"
+    fibre = stage.new(kind, **({} if model == "STRAND" else {"model": model}))
+    stage.link(fibre.outputs[0], stage.tree.get_output_node("CYCLES").inputs["Surface"])
+    world = bpy.data.worlds.new("World")
+    stage.scene.world = world
+    if world.node_tree is None:
+        world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs[0].default_value = (1.0, 1.0, 1.0, 1.0)
+    stage.scene.cycles.samples, stage.scene.cycles.max_bounces = 16, 4
+    theirs = stage.cycles()
+    stage.scene.render.engine = "GI_ENGINE"
+    bpy.ops.render.render(write_still=True)
+    ours = stage.rendered()
+    assert np.isfinite(ours).all() and ours.mean() == pytest.approx(theirs.mean(), rel=0.03)

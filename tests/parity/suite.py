@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from . import cases_lights, cases_materials, cases_nodes, compare
+from . import cases_hair, cases_lights, cases_materials, cases_nodes, compare
 from .studio import Case, Unavailable, empty, tile_region
 
-CASES = {case.name: case for module in (cases_lights, cases_materials, cases_nodes) for case in module.CASES}
+CASES = {
+    case.name: case for module in (cases_hair, cases_lights, cases_materials, cases_nodes) for case in module.CASES
+}
 
 
 @lru_cache(maxsize=4)

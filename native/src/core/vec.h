@@ -176,6 +176,7 @@ struct Ray {
   float t_min = 0.0f, t_max = kInf;
   // The strand or point of an instance that it does not meet: the one that it leaves; all ones where that is a surface.
   uint32_t left_instance = 0xffffffffu, left_strand = 0xffffffffu;
+  bool goes_on = false;  // straight through what it leaves
 };
 
 }  // namespace gi

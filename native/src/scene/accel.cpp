@@ -25,6 +25,7 @@ enum RayId : uint32_t { kLeavesSurface, kLeavesStrand };
 struct CollectContext {
   RayContext ray;
   std::vector<gi::Hit>* hits;
+  float back;
 };
 
 uint32_t instance_of(const embree::Hit& h) { return h.instance[0] != kInvalidId ? h.instance[0] : h.geometry; }
@@ -51,7 +52,7 @@ void skip_inside(const FilterArguments* a) {
 void collect_hit(const FilterArguments* a) {
   const auto* collect = reinterpret_cast<const CollectContext*>(a->context);
   const embree::Hit& h = *a->hit;
-  collect->hits->push_back({a->ray->t_far, instance_of(h), h.primitive, h.u, h.v});
+  collect->hits->push_back({a->ray->t_far - collect->back, instance_of(h), h.primitive, h.u, h.v});
   a->valid[0] = 0;  // go on
 }
 
@@ -149,6 +150,17 @@ struct MeshTree {
   ~MeshTree() { shared->api.ReleaseScene(scene); }
 };
 
+// Embree misses ribbons that are nearer to a ray's origin than twice their radius, which may swing between the points of a spline. So does
+// Cycles, but not where a ray goes straight on: there it is still the same ray.
+constexpr float kRibbonsBegin = 2.0f * 1.3f;
+
+// No less than what the matrix makes of any unit vector.
+float largest_scale(const Affine& a) {
+  float sum = 0;
+  for (const auto& row : a.m) sum += row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
+  return std::sqrt(sum);
+}
+
 class EmbreeAccel final : public Accel {
  public:
   EmbreeAccel(const std::string& library, std::vector<AccelMesh> meshes, std::vector<AccelInstance> instances, int threads,
@@ -199,7 +211,7 @@ class EmbreeAccel final : public Accel {
     hits.clear();
     embree::Ray r;
     fill(r, ray, mask);
-    CollectContext collect{{}, &hits};
+    CollectContext collect{{}, &hits, back_of(ray)};
     QueryArguments arguments;
     say_what_it_leaves(ray, collect.ray, arguments);
     arguments.flags = kInvokeArgumentFilter;
@@ -225,7 +237,7 @@ class EmbreeAccel final : public Accel {
     rh.hit.geometry = kInvalidId, rh.hit.instance[0] = kInvalidId;
     api_.Intersect1(top_, &rh, &arguments);
     if (rh.hit.geometry == kInvalidId) return {};
-    return gi::Hit{rh.ray.t_far, instance_of(rh.hit), rh.hit.primitive, rh.hit.u, rh.hit.v};
+    return gi::Hit{rh.ray.t_far - back_of(ray), instance_of(rh.hit), rh.hit.primitive, rh.hit.u, rh.hit.v};
   }
 
   static void say_what_it_leaves(const gi::Ray& ray, RayContext& leaves, QueryArguments& arguments) {
@@ -234,20 +246,24 @@ class EmbreeAccel final : public Accel {
     arguments.context = &leaves.context;
   }
 
-  static void fill(embree::Ray& r, const gi::Ray& ray, uint32_t mask) {
-    r = {ray.origin.x,
-         ray.origin.y,
-         ray.origin.z,
-         ray.t_min,
+  void fill(embree::Ray& r, const gi::Ray& ray, uint32_t mask) const {
+    const float back = back_of(ray);
+    const Vec3 origin = back > 0.0f ? ray.origin - ray.direction * back : ray.origin;
+    r = {origin.x,
+         origin.y,
+         origin.z,
+         ray.t_min + back,
          ray.direction.x,
          ray.direction.y,
          ray.direction.z,
          0.0f,
-         ray.t_max,
+         ray.t_max + back,
          mask,
          ray.left_strand == kInvalidId ? kLeavesSurface : kLeavesStrand,
          0};
   }
+
+  float back_of(const gi::Ray& ray) const { return ray.goes_on ? back_ : 0.0f; }
 
   void build(const std::vector<AccelInstance>& instances) {
     top_ = api_.NewScene(shared_->device);
@@ -255,6 +271,9 @@ class EmbreeAccel final : public Accel {
       const AccelInstance& instance = instances[i];
       const AccelMesh& mesh = meshes_[instance.mesh];
       if (mesh.empty()) continue;
+      if (mesh.strands && mesh.strands->is_ribbon())
+        back_ =
+            std::max(back_, kRibbonsBegin * mesh.strands->largest_radius() * (instance.matrix ? largest_scale(*instance.matrix) : 1.0f));
       if (!instance.matrix) {
         shared_->attach(top_, shared_->triangles(mesh), instance.mask, i);
         continue;
@@ -274,6 +293,7 @@ class EmbreeAccel final : public Accel {
   std::vector<AccelMesh> meshes_;
   std::vector<std::shared_ptr<const MeshTree>> trees_;  // by mesh; null where none was needed
   Scene top_ = nullptr;
+  float back_ = 0;  // metres: where rays that go on begin, before their origin
 };
 
 }  // namespace

@@ -14,7 +14,9 @@ void strand(const Operands& o, ShadeState& s) {
   if (!instance_of(s)) return;
   if (s.point.strand != kNoId) {
     const bool is_point = s.resources.scene->mesh(s.point.mesh).primitive == Primitive::kSphere;
-    o.set(0, s.resources.scene->strand_place(s.point).along), o.set(2, is_point ? 0.0f : 1.0f);
+    const Vec3 along = s.resources.scene->strand_place(s.point).along;
+    // Where points of a curve lie on one another it has no direction: any across the surface, or it would be black.
+    o.set(0, is_point || !(along == Vec3{}) ? along : Frame::from_normal(s.point.ns).x), o.set(2, is_point ? 0.0f : 1.0f);
     if (s.resources.scene->is_ribbon(s.point)) o.set(3, -s.point.b2);
     return;
   }

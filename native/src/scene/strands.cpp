@@ -1,6 +1,8 @@
 // Strands: which vertices make which segment, and where it is.
 #include "scene/strands.h"
 
+#include <algorithm>
+
 namespace gi {
 
 Strands::Strands(const MeshData& mesh) : primitive_(mesh.primitive) {
@@ -9,6 +11,7 @@ Strands::Strands(const MeshData& mesh) : primitive_(mesh.primitive) {
   const auto add_vertex = [&](size_t v) {
     const float* p = mesh.positions.data + 3 * v;
     vertices_.insert(vertices_.end(), {p[0], p[1], p[2], mesh.radius[v]});
+    largest_radius_ = std::max(largest_radius_, mesh.radius[v]);
   };
   if (are_points()) {
     for (size_t v = 0; v < mesh.vertex_count(); ++v) add_vertex(v);

@@ -29,6 +29,7 @@ class Strands {
   Vec3 center(uint32_t segment, float u) const;
   Vec3 derivative(uint32_t segment, float u) const;  // of the centre, by u; of points zero
   float radius(uint32_t segment, float u) const;     // between the vertices', as the nodes that ask for it have it
+  float largest_radius() const { return largest_radius_; }  // of the vertices
   size_t memory_bytes() const { return vertices_.size() * 4 + segments_.size() * 12; }
 
  private:
@@ -40,6 +41,7 @@ class Strands {
   }
 
   Primitive primitive_;
+  float largest_radius_ = 0;
   std::vector<float> vertices_;
   std::vector<uint32_t> segments_, strands_, begins_;
 };

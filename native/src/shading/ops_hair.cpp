@@ -46,13 +46,26 @@ void hair_chiang(const Operands& o, ShadeState& s) {
   add_lobe(s, Rgb(o.f(0)), HairChiang::make(positive(o.c(1)), o.f(2), o.f(3), o.f(4), o.f(5), std::max(o.f(6), 1e-3f), h), y, x);
 }
 
-// weight, absorption, roughness, offset, ior, aspect, R, TT, TRT; along the fibre
+// weight, absorption, roughness, offset, ior, aspect, R, TT, TRT; along the fibre, where a ribbon is met, whether it is a strand, its
+// diameter (metres); its own normal, along which the long axis lies, taken for the world's as in Cycles. Rays that pass an elliptic fibre,
+// which is traced as a round one, go on. Where the camera sees the fibre wider than a pixel, it sees the pixel's part of the width alone.
 void hair_huang(const Operands& o, ShadeState& s) {
   if (!s.bsdf || (o.f(6) <= 0.0f && o.f(7) <= 0.0f && o.f(8) <= 0.0f)) return;
-  const Vec3 y = normalize_or(o.v(9), Vec3{}), x = normalize_or(cross(y, s.point.wo), Vec3{});
-  if (x == Vec3{}) return;
-  const HairHuang::Look look{positive(o.c(1)), o.f(2), o.f(3), std::max(o.f(4), 1e-3f), std::max(o.f(5), 1e-3f), o.f(6), o.f(7), o.f(8)};
-  add_lobe(s, Rgb(o.f(0)), HairHuang::make(look), x, y);
+  const Vec3 y = normalize(o.v(9)), across = normalize(cross(y, s.point.wo));
+  if (across == Vec3{}) return;
+  const bool strand = o.f(11) != 0.0f, elliptic = strand && o.f(5) != 1.0f;
+  const float aspect = std::max(elliptic && o.f(5) > 1.0f ? 1.0f / o.f(5) : o.f(5), 1e-3f);
+  const Vec3 own = normalize(cross(y, cross(o.v(13), y))), x = elliptic ? normalize_or(own, Frame::from_normal(y).x) : across;
+  HairHuang lobe = HairHuang::make({positive(o.c(1)), o.f(2), o.f(3), std::max(o.f(4), 1e-3f), aspect, o.f(6), o.f(7), o.f(8)});
+  const float h = std::abs(o.f(10)) <= 1.0f ? o.f(10) : -dot(across, s.point.ns);
+  const float wide = lobe.projected_radius(Frame::from_normal_and_tangent(x, y).to_local(s.point.wo));
+  if (elliptic && std::abs(h) >= wide) {
+    s.bsdf->transparency += Rgb(o.f(0));
+    return;
+  }
+  const float pixel = s.point.footprint / (0.5f * o.f(12));  // over the fibre's radius
+  if (strand && (s.point.path.kind & kRayCamera) && pixel > 0.0f && wide > pixel) lobe.h_from = h - pixel, lobe.h_to = h + pixel;
+  add_lobe(s, Rgb(o.f(0)), lobe, x, y);
 }
 
 const Op kOps[] = {
@@ -61,7 +74,8 @@ const Op kOps[] = {
     {"absorption_of_melanin", "v", "ff", 0, OpKind::kPure, absorption_of_melanin},
     {"hair_strand", "", "fvfffvvvf", 1, OpKind::kClosure, hair_strand, kAddsLobe},
     {"hair_chiang", "", "fvfffffvf", 0, OpKind::kClosure, hair_chiang, kAddsLobe},
-    {"hair_huang", "", "fvfffffffv", 0, OpKind::kClosure, hair_huang, kAddsLobe},
+    {"hair_huang", "", "fvfffffffvfffv", 0, OpKind::kClosure, hair_huang, kAddsLobe},
+    {"hair_huang_elliptic", "", "fvfffffffvfffv", 0, OpKind::kClosure, hair_huang, kAddsLobe | kAddsTransparency | kSeesPoint},
 };
 
 }  // namespace

@@ -54,7 +54,7 @@ inline Vec3 offset_point(Vec3 p, Vec3 ng, Vec3 direction) {
 // A ray that leaves a surface, or a strand, which it does not meet again wherever on it it begins.
 inline Ray ray_from(const ShadingPoint& point, Vec3 direction, float t_max = kInf) {
   if (point.strand == kNoId) return {offset_point(point.position, point.ng, direction), direction, 0.0f, t_max};
-  return {point.position, direction, 0.0f, t_max, point.instance, point.strand};
+  return {point.position, direction, 0.0f, t_max, point.instance, point.strand, direction == -point.wo};
 }
 
 // Blender's Clamp Direct/Indirect: `limit` is the largest mean of the channels; 0 is off.

@@ -1,6 +1,8 @@
 // Blender's Hair BSDF: one bounce off a fibre, or through it, by empirical distributions: Cauchy's along the fibre; around it a cosine for
-// reflection, Cauchy's about straight on for transmission. Value and density are the same, as in Blender, whose two edges are kept: what
-// reflection throws more than 90° aside is drawn but not evaluated, and transmission is evaluated on the whole far side of the surface.
+// reflection, Cauchy's about straight on for transmission. Value and density are the same, as in Blender, whose edges are kept: what
+// reflection throws more than 90° aside, yet not behind the surface, is drawn but not evaluated, and transmission is evaluated on the whole
+// far side of the surface. Behind the surface reflection is all there: Blender finds lamps of some size there by its samples alone, whole,
+// and lamps of no size not at all.
 #pragma once
 #include "shading/lobes/hair_fibre.h"
 
@@ -17,7 +19,7 @@ struct HairStrand {
   }
   static constexpr bool kAllAround = true;
   void blur(float alpha) { along = std::max(along, alpha), around = std::max(around, alpha); }
-  uint8_t flags() const { return (transmits ? kTransmission : kReflection) | kGlossy; }
+  uint8_t flags() const { return (transmits ? kTransmission : kReflection | kTransmission) | kGlossy; }
   Rgb albedo(Vec3) const { return Rgb(1.0f); }
 
   LobeEval eval(Vec3 wo, Vec3 wi) const {
@@ -27,7 +29,7 @@ struct HairStrand {
     const float p = density_along(o, theta_i), phi = std::abs(std::atan2(dot(o.x, wi), dot(o.y, wi)));
     if (!transmits) {
       const float q = phi / around < kPi ? std::cos(0.5f * phi / around) * 0.25f / around : 0.0f;
-      return {Rgb(phi < 0.5f * kPi ? p * q : 0.0f), p * q};
+      return {Rgb(phi < 0.5f * kPi || wi.z < 0.0f ? p * q : 0.0f), p * q};
     }
     const float away = kPi - phi, q = density_through(away);
     return {Rgb(p * q), away < 0.5f * kPi ? p * q : 0.0f};
@@ -42,7 +44,7 @@ struct HairStrand {
     const float pdf = density_along(o, theta_i) * q, c = std::cos(theta_i);
     if (!(pdf > 0.0f)) return {};
     const Vec3 wi = o.y * (std::cos(phi) * c) + o.x * (std::sin(phi) * c) + tangent * std::sin(theta_i);
-    return LobeSample{wi, Rgb(pdf), pdf, flags(), std::sqrt(along * around)};
+    return LobeSample{wi, Rgb(pdf), pdf, uint8_t(kGlossy | (transmits ? kTransmission : kReflection)), std::sqrt(along * around)};
   }
 
  private:
