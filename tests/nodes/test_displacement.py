@@ -7,7 +7,7 @@ import pytest
 from_5 = pytest.mark.skipif(
     bpy.app.version < (5, 0, 0), reason="we follow Cycles 5; 4.5 differs here, and not all of why is known"
 )
-BOTH_FROM_5 = ["DISPLACEMENT", pytest.param("BOTH", marks=from_5)]
+MOVED = ["DISPLACEMENT", "BOTH"]
 
 
 def displace(stage, method, idname="ShaderNodeDisplacement", material=None, scale=0.25, **settings):
@@ -58,12 +58,12 @@ def see_from_below(stage):
 
 
 def tolerance_of(method, what):
-    # Bumps are differences over steps of the surface that the engines take in different directions.
-    return 2e-2 if method != "DISPLACEMENT" and what in {"normal", "tangent"} else 1e-3
+    # Bumps are differences over small steps.
+    return 4e-3 if method != "DISPLACEMENT" and what in {"normal", "tangent"} else 1e-3
 
 
 @pytest.mark.parametrize("what", SHOWN)
-@pytest.mark.parametrize("method", ["DISPLACEMENT", "BOTH"])
+@pytest.mark.parametrize("method", MOVED)
 def test_displaced(stage, method, what):
     displace(stage, method)
     show(stage, what)
@@ -72,7 +72,7 @@ def test_displaced(stage, method, what):
 
 
 @pytest.mark.parametrize("what", ["position", "normal"])
-@pytest.mark.parametrize("method", BOTH_FROM_5)
+@pytest.mark.parametrize("method", MOVED)
 def test_flat_faces(stage, method, what):
     stage.object.data.shade_flat()
     displace(stage, method)
@@ -116,7 +116,7 @@ def test_flat_and_in_both_spaces(stage, space, flat):
 
 
 @pytest.mark.parametrize("what", ["position", "normal"])
-@pytest.mark.parametrize("method", BOTH_FROM_5)
+@pytest.mark.parametrize("method", MOVED)
 @pytest.mark.parametrize("space", ["TANGENT", "OBJECT", "WORLD"])
 def test_vectors(stage, space, method, what):
     displace(stage, method, "ShaderNodeVectorDisplacement", space=space)
@@ -135,7 +135,7 @@ def test_normal_maps(stage, method, base):
     stage.check(tolerance=tolerance_of(method, "normal"))
 
 
-@pytest.mark.parametrize("second_method", [*BOTH_FROM_5, "BUMP"])
+@pytest.mark.parametrize("second_method", [*MOVED, "BUMP"])
 def test_faces_of_two_materials(stage, second_method):
     """What both have is moved once, as the first face says; normals are made of those faces alone that displacement shapes."""
     plain = stage.material.copy()
@@ -150,7 +150,7 @@ def test_faces_of_two_materials(stage, second_method):
     mesh.materials.append(plain)
     columns = round(len(mesh.polygons) ** 0.5)
     mesh.polygons.foreach_set("material_index", [(k // columns) // 4 for k in range(len(mesh.polygons))])
-    stage.check(tolerance=2e-2 if second_method != "DISPLACEMENT" else 1e-3)
+    stage.check(tolerance=4e-3 if second_method != "DISPLACEMENT" else 1e-3)
 
 
 def add_second(stage):

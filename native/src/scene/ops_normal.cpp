@@ -100,8 +100,9 @@ Steps pixel_steps(const ShadeState& s) {
   const Scene* scene = s.resources.scene;
   float step = 2.0f * s.point.footprint;  // the footprint is a radius
   if (!(step > 0.0f)) step = kDefaultStep * (scene && !scene->bounds().empty() ? length(scene->bounds().extent()) : 1.0f);
-  const Frame frame = Frame::from_normal(s.point.ng);
-  return {frame.x * step, frame.y * step};
+  // As Cycles turns them, for where a surface has been displaced sideways the result hangs on it.
+  const Vec3 n = s.point.ng, x = normalize_or(cross(Vec3{1, 1, 1}, n), Frame::from_normal(n).x);
+  return {x * step, cross(n, x) * step};
 }
 
 // The same steps where the surface was before true displacement: to the same places between the vertices.
@@ -159,8 +160,8 @@ void bump(const Operands& o, ShadeState& s) {
   set_or_keep(o, s, r);
 }
 
-// -> what redisplace needs; steps get another length, as Cycles 4.5 has them. Everything until then sees the point where it was before
-// true displacement; the normal stays so.
+// -> what redisplace needs; as in Cycles 4.5: steps get another length, and the normal is that of the displaced surface. Everything until
+// then sees the point where it was before true displacement; the normal stays so.
 void undisplace(const Operands& o, ShadeState& s) {
   ShadingPoint& p = s.point;
   o.set(0, p.position), o.set(1, p.object_position), o.set(2, Vec3{p.b1, p.b2, 0.0f});
@@ -168,8 +169,8 @@ void undisplace(const Operands& o, ShadeState& s) {
   const auto before = i ? s.resources.scene->undisplaced(p) : std::nullopt;
   if (!before) return;
   p.position = before->position, p.object_position = i->to_object.point(before->position);
-  p.ns = before->normal, p.undisplaced_step = 1.0f;
-  if (!o.imm(3)) return;
+  p.undisplaced_step = 1.0f;
+  if (!o.imm(3)) return void(p.ns = before->normal);
   const Steps now = pixel_steps(s), then = undisplaced_steps(s, *before, now);
   p.undisplaced_step = (length(then.dx) + length(then.dy)) / (length(now.dx) + length(now.dy));
 }
