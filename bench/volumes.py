@@ -37,8 +37,8 @@ def measure(scene, engine: str, rounds: int) -> tuple[float, float]:
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--pixels", type=int, default=96)
-    parser.add_argument("--samples", type=int, default=32)
+    parser.add_argument("--pixels", type=int, default=64)
+    parser.add_argument("--samples", type=int, default=16)
     options = parser.parse_args()
     compare.register_once()
     lines = [

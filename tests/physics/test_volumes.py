@@ -202,7 +202,22 @@ def test_furnace_of_a_world_that_thins_out():
     check(seen(scene, (0, 0, 0), (0.2, 0, 1), samples=32), 1.0, 5e-3)
 
 
-def test_rays_that_would_take_too_long_end_and_are_told_of():
+@pytest.mark.parametrize("glow", [0.0, 0.2])
+def test_rays_that_would_take_too_long_go_on_in_even_steps(glow):
+    """Beside what is so thick that its bounds ask for more lookups than a ray may have, in the same cells."""
+
+    def thick_beside(b):
+        x = b.component(b.op("position"), 0)
+        return b.op(
+            "vector_scale", (1.0,) * 3, b.op("math_multiply_add", b.op("math_less_than", x, 0.0), 2e6 - 0.5, 0.5)
+        )
+
+    scene = filled(medium(thick_beside, None, (glow,) * 3), world=1.0)
+    image = seen(scene, (2e-3, 0.1, 3), (0, 0, -1), samples=4, pixels=8)
+    check(image, math.exp(-1.0) + glow / 0.5 * (1.0 - math.exp(-1.0)), 5e-3)
+
+
+def test_rays_that_would_take_too_long_are_told_of():
     """A world whose density grows without bounds."""
     scene = filled_world(medium(None, by_height(0.3, 0.3, 0.3, falloff=5.0)), glow=1.0)
     scene.camera = sd.Camera("camera", "ORTHO", looking((0, 0, 9), (0, 0.1, -1)), (-1, 1, -1, 1), 0.0, 1e6)

@@ -124,7 +124,7 @@ void Session::run() {
     }
     if (volumes.rays_given_up() > 0)
       log_.say(std::to_string(volumes.rays_given_up()) +
-               " rays through volumes took too long to follow and ended black: somewhere a "
+               " rays through volumes took too long to follow and went on in even steps, which is less exact: somewhere a "
                "volume is very thick beside where it is thin");
   } catch (const std::bad_alloc&) {
     error = "out of memory while rendering";

@@ -35,9 +35,10 @@ MediumEvent sample_uniform(const Medium& medium, float t_max, Rgb throughput, bo
 
 // Goes along `way` from collision to collision with anything that there may be: each comes after an optical depth drawn anew, of the rate
 // that `rate` makes of bounds. pass(bounds, length) is called for each stretch between, collide(t, rate) at each collision; false ends it.
-// False where there were so many that the way is given up: a cell with very much in one place, and nothing in another.
+// Where that was given up for so many collisions, for marched() to go on: a cell with very much in one place, and nothing in another.
 template <class Way, class Rate, class Pass, class Collide>
-bool track(const Way& way, float from, float t_max, Sampler& random, const Rate& rate, const Pass& pass, const Collide& collide) {
+std::optional<float> track(const Way& way, float from, float t_max, Sampler& random, const Rate& rate, const Pass& pass,
+                           const Collide& collide) {
   constexpr int kMostLooks = 1 << 15;
   t_max = std::min(t_max, way.end());
   int looks = 0;
@@ -53,13 +54,25 @@ bool track(const Way& way, float from, float t_max, Sampler& random, const Rate&
       if (!(next < until)) break;
       pass(b, next - t);
       t = next, depth = draw();
-      if (!collide(t, b, r)) return true;
-      if (++looks == kMostLooks) return false;
+      if (!collide(t, b, r)) return {};
+      if (++looks == kMostLooks) return t;
     }
     pass(b, until - t);
     depth = std::max(depth - r * (until - t), 0.0f), t = until;
   }
-  return true;
+  return {};
+}
+
+// Goes on along `way` in even steps: march(from, length, medium) for each, with what there is somewhere in it; false ends it. Biased, but
+// in bounded time.
+template <class Way, class March>
+void marched(const Way& way, float from, float t_max, Sampler& random, const March& march) {
+  constexpr int kSteps = 1 << 10;
+  const float length = (std::min(t_max, way.end()) - from) / float(kSteps);
+  for (int i = 0; i < kSteps && length > 0.0f; ++i) {
+    const float begin = from + float(i) * length;
+    if (!march(begin, length, way.at(begin + random.next_1d() * length))) return;
+  }
 }
 
 }  // namespace
@@ -185,7 +198,13 @@ Rgb Media::transmittance(const Scene& scene, const Ray& ray, float t_max, const 
     passed *= kRoulette / left;
     return true;
   };
-  if (!track(way, ray.t_min, t_max, random, rate, pass, collide)) return volumes_->give_up(), Rgb();
+  if (const auto t = track(way, ray.t_min, t_max, random, rate, pass, collide)) {
+    volumes_->give_up();
+    marched(way, *t, t_max, random, [&](float, float length, const Medium& medium) {
+      passed *= medium.transmittance(length);
+      return !is_black(passed);
+    });
+  }
   const float rest = t_max - std::max(way.end(), ray.t_min);
   return rest > 0.0f && !is_black(passed) ? passed * way.uniform().transmittance(rest) : passed;
 }
@@ -246,9 +265,14 @@ MediumEvent Media::sample(const Scene& scene, const Ray& ray, float t_max, Rgb t
     return true;
   };
   const auto unseen = [](const VolumeBounds&, float) {};
-  if (!track(way, ray.t_min, t_max, random, rate, unseen, collide)) {
+  if (const auto t = track(way, ray.t_min, t_max, random, rate, unseen, collide)) {
     volumes_->give_up();
-    return event.weight = Rgb(), event.scattered = false, event;
+    marched(way, *t, t_max, random, [&](float begin, float length, const Medium& medium) {
+      const MediumEvent step = sample_uniform(medium, length, throughput * event.weight, may_scatter, random.next_2d());
+      event.emitted += event.weight * step.emitted, event.weight *= step.weight;
+      if (step.scattered) event.t = begin + step.t, event.scattered = true, event.medium = medium;
+      return !step.scattered && !is_black(event.weight);
+    });
   }
   const float rest = t_max - std::max(way.end(), ray.t_min);
   if (event.scattered || !(rest > 0.0f) || way.uniform().empty()) return event;
