@@ -10,6 +10,7 @@ import re
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from ..approximations import heading
 from ..scene_data import Program, Scene
 from .attributes import VERTEX_NORMAL, look_up
 from .node_builder import NodeBuilder, by_identifier
@@ -291,15 +292,20 @@ class TreeWalker:
                     self.builder.op(op, self.value(context, node.inputs[socket]), imm=(index,))
 
     def noted(self, program: Program) -> Program:
-        program.needs, program.approximated = sorted(self.needs), list(self.approximated.values())
+        """One warning for the user that names the owner and all the nodes."""
+        texts = list(self.approximated.values())
+        program.needs, program.approximated = sorted(self.needs), texts
+        if texts:
+            several = f"{heading(texts)}: " if len(texts) > 1 else ""
+            self.compiler.warn(f"{self.who}: {several}{'; '.join(texts)}")
         return program
 
     def approximate(self, node, text: str) -> None:
-        """One warning for the user that names the owner and the node."""
         named = f"node '{self.name_of(node)}' ({node.bl_label}): {text}"
-        if not text.endswith(AS_CYCLES):
+        if text.endswith(AS_CYCLES):
+            self.compiler.warn(f"{self.who}: {named}")
+        else:
             self.approximated.setdefault(self.name_of(node), named)
-        self.compiler.warn(f"{self.who}: {named}")
 
     def name_of(self, node) -> str:
         """As the user knows the node: inlining puts a number before the names of all but outputs."""

@@ -74,6 +74,12 @@ def test_approximated_nodes_are_counted(skin):
     found = exported("path")
     assert approximated(found.scene) == ['"Skin": 1 node approximated']
     assert len(approximations.of("Skin")) == 1 and "Burley" in approximations.of("Skin")[0]
+    volume = tree.nodes.new("ShaderNodeVolumeScatter")
+    volume.phase = "FOURNIER_FORAND"
+    tree.links.new(volume.outputs[0], tree.nodes["Material Output"].inputs["Volume"])
+    warnings = [text for text in exported("path").warnings if "Skin" in text]
+    assert len(warnings) == 1 and "2 nodes approximated" in warnings[0] and "Fournier" in warnings[0]
+    tree.links.remove(tree.nodes["Material Output"].inputs["Volume"].links[0])
     tree.links.new(tree.nodes["Principled BSDF"].outputs[0], tree.nodes["Material Output"].inputs["Surface"])
     exported("path")
     assert not approximations.of("Skin")
