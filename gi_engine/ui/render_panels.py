@@ -23,6 +23,7 @@ BOUNCES = (
 ADVANCED = (
     "aim",
     "alpha",
+    "branches",
     "cached_bounces",
     "cached_caustics",
     "cached_sky",

@@ -201,7 +201,7 @@ def test_bowl_under_the_sky():
         near(found, 0.8 * 0.5 / (1 - 0.8 * 0.5), 0.02)
 
 
-AGREEING = ["area lamp", "point lamp", "smooth normals", "gloss", "principled", "bumpy", "translucent", "transparent shadows", "emissive mesh", "sky"]  # fmt: skip
+AGREEING = ["area lamp", "point lamp", "smooth normals", "gloss", "principled", "coat", "metal", "bumpy", "translucent", "transparent shadows", "emissive mesh", "sky"]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", AGREEING)
@@ -364,6 +364,23 @@ def test_caustics_leave_grain_and_no_spots():
         assert abs(means.mean() - truth.mean()) < 4 * means.std(ddof=1) / math.sqrt(len(means)) + 0.01 * truth.mean()
         spots[limit] = np.mean(found > 1.25 * truth)
     assert spots[10.0] < 0.5 * spots[1e9], spots
+
+
+def test_branches_take_noise_away_where_light_is_not_cached():
+    """On a metal sheet, seen from so near that nothing changes within a pixel."""
+    sheet = quad((-0.4, -0.4, 0), (0.4, -0.4, 0), (0.4, 0.4, 0), (-0.4, 0.4, 0))
+
+    def metal(seed, branches):
+        light = lamp("POINT", (20.0,) * 3, matrix=matrix((0.5, 0.4, 0.6)))
+        scene = scene_of((cube(), surface(0.5)), (sheet, shiny(0.6)), lights=[light])
+        scene.camera = sd.Camera("camera", "ORTHO", matrix((0, 0, 0.9)), (-0.2, 0.2, -0.2, 0.2), 0.0, 100.0)
+        (image,), _ = render(scene, seed, samples=4, branches=branches, refinement=0)
+        return image[..., :3]
+
+    one, four = (np.array([metal(seed, branches) for seed in range(1, 13)]) for branches in (1, 4))
+    assert between_seeds(four) < 0.25 * between_seeds(one), (between_seeds(four), between_seeds(one))
+    spread = np.hypot(*(images.mean((1, 2, 3)).std(ddof=1) / math.sqrt(len(images)) for images in (one, four)))
+    assert abs(four.mean() - one.mean()) < 3.5 * spread
 
 
 def test_cancel_ends_the_overture():

@@ -42,6 +42,13 @@ class Sampler {
     s.key_ = hash_combine(key_, salt), s.dimension_ = 0, s.has_spare_ = false;
     return s;
   }
+  // The k-th of `count` for as many branches of one path: those of all passes are one stratified sequence.
+  Sampler branch(uint32_t k, uint32_t count) const {
+    constexpr uint32_t kBranches = 0x6272616eu;
+    Sampler s = fork(kBranches);
+    s.index_ = reverse_bits(reverse_bits(index_) * count + k);
+    return s;
+  }
   // Moves on to batch `b` of dimension pairs: a bounce starts there however many numbers
   // the one before used. The camera has batch 0.
   void jump_to(uint32_t b) { dimension_ = b * kBatch, has_spare_ = false; }

@@ -8,6 +8,7 @@ namespace gi {
 namespace {
 
 constexpr LightSampling kMode = LightSampling::kMis;
+constexpr float kDiffuseShare = 0.1f;  // times as often as otherwise diffuse lobes are sampled that are cached: for luminaires alone
 constexpr uint8_t kDiffuseLobes = kReflection | kTransmission | kDiffuse;
 
 // A path under way. What it finds of luminaires and what of anything else may count differently: luminaires are sampled at every
@@ -22,8 +23,26 @@ struct Walk {
   Rgb mirrors{1.0f};          // throughput of the mirrors since the last other surface
   bool by_mirror = false;     // there are some
   float first_distance = kInf;
+  uint32_t bounce = 0;
+  bool may_scatter = true;   // false past the last bounce: it may still meet a luminaire
+  bool may_branch = false;   // where it first scatters
+  float least_pdf = kInf;    // of the directions that it took
+  float parts = 1.0f;        // of a path that it is one of
 
+  void share(int branches) {
+    const float part = 1.0f / float(branches);
+    path.throughput *= part, to_luminaires *= part, to_known_sky *= part, to_excess *= part, parts *= float(branches);
+  }
   bool is_over() const { return is_black(to_luminaires) && is_black(to_known_sky) && is_black(to_excess); }
+};
+
+// Where a path has arrived, and what of its light is known.
+struct Arrival {
+  const ShadingPoint& point;
+  const Bsdf& bsdf;
+  const LightQuery& query;
+  float distance;  // since the last surface
+  bool is_cached, may_mirror;
 };
 
 class IrradianceCacheIntegrator final : public Integrator {
@@ -37,6 +56,7 @@ class IrradianceCacheIntegrator final : public Integrator {
         filter_glossy_(p.real("filter_glossy")),
         cached_caustics_(p.real("cached_caustics")),
         cached_sky_(p.real("cached_sky")),
+        branches_(p.integer("branches")),
         records_({p.real("error"),
                   p.integer("record_samples"),
                   p.integer("cached_bounces"),
@@ -63,6 +83,7 @@ class IrradianceCacheIntegrator final : public Integrator {
     if (context.cancelled) return;
     for_each_pixel(context, pass, film, [&](const CameraRay& camera, Sampler& sampler, PixelSample& result) {
       Walk walk{CameraPath(camera)};
+      walk.may_branch = true;
       trace(context, film, camera, walk, sampler, result);
     });
   }
@@ -75,6 +96,10 @@ class IrradianceCacheIntegrator final : public Integrator {
  private:
   void trace(const RenderContext& context, const Film& film, const CameraRay& camera, Walk& walk, Sampler& sampler,
              PixelSample& result) const;
+  void branch_off(const RenderContext& context, const Film& film, const CameraRay& camera, const Arrival& from, Walk walk,
+                  const Sampler& sampler, PixelSample& result) const;
+  // Draws a direction and sets off. False: the path ends.
+  bool scatter(const Film& film, const Arrival& from, Vec2 u, float u_lobe, Walk& walk, Sampler& sampler) const;
 
   BounceLimits limits_;
   float clamp_direct_, clamp_indirect_;
@@ -82,6 +107,7 @@ class IrradianceCacheIntegrator final : public Integrator {
   float filter_glossy_;
   float cached_caustics_;  // radiance
   float cached_sky_;       // times the sky's mean
+  int branches_;
   float known_sky_ = 0;    // radiance
   float sky_share_ = 1;    // of the sky's light, what exceeds that
   IrradianceRecords records_;
@@ -91,8 +117,6 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
                                       PixelSample& result) const {
   Bsdf bsdf;
   CameraPath& path = walk.path;
-  bool may_scatter = true;
-  float least_pdf = kInf;
   const auto add = [&](Rgb throughput, Rgb radiance, int depth) {
     if (is_black(radiance) || is_black(throughput)) return;
     result.radiance += clamp_contribution(throughput * radiance, depth > 1 ? clamp_indirect_ : clamp_direct_);
@@ -103,8 +127,8 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     if (walk.by_mirror) add(walk.to_excess, positive(walk.mirrors * radiance - Rgb(cached_caustics_)), depth);
   };
 
-  for (uint32_t bounce = 0;; ++bounce) {
-    sampler.jump_to(bounce + 1);
+  for (;; ++walk.bounce) {
+    sampler.jump_to(walk.bounce + 1);
     const uint32_t visibility = visibility_of(path.state.kind);
     const int depth = path.state.depth;
     const auto hit = context.scene.intersect(path.ray, visibility);
@@ -117,18 +141,18 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
       add_luminaire(beyond, depth, walk.to_known_sky * min(beyond.world, Rgb(known_sky_)) * beyond.world_weight);
       break;
     }
-    if (bounce == 0) walk.first_distance = hit->t;
+    if (walk.bounce == 0) walk.first_distance = hit->t;
     const bool may_mirror = context.scene.material(context.scene.material_of(hit->instance, hit->triangle)).program.may_mirror();
-    if (!may_scatter || is_black(path.throughput)) {
+    if (!walk.may_scatter || is_black(path.throughput)) {
       if (walk.is_over()) break;
-      const bool goes_on = may_scatter && may_mirror && !is_black(walk.to_excess);
+      const bool goes_on = walk.may_scatter && may_mirror && !is_black(walk.to_excess);
       if (const auto emitted = goes_on ? std::nullopt : path.end(context, camera, *hit, kMode)) {
         add_luminaire(*emitted, depth);
         break;
       }
     }
     const ShadingPoint point = path.arrive(context, film, camera, *hit, bsdf, result);
-    if (least_pdf < filter_glossy_) bsdf.blur(0.5f * std::sqrt(1.0f - least_pdf / filter_glossy_));
+    if (walk.least_pdf < filter_glossy_) bsdf.blur(0.5f * std::sqrt(1.0f - walk.least_pdf / filter_glossy_));
 
     const Rgb emitted = surface_emission(context, point, bsdf.emission, path.origin, kMode);
     if (depth == 0) result.emission += path.throughput * emitted;
@@ -139,11 +163,12 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
     const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
     LightQuery query = light_query(point, bsdf);
     bool is_cached = false;
-    if (may_scatter && !is_black(path.throughput)) {
+    if (walk.may_scatter && !is_black(path.throughput)) {
       if ((bsdf.flags() & kDiffuse) && point.strand == kNoId) {
         const auto radiance = records_.read(point, bsdf, result);
         if (radiance) result.radiance += path.throughput * *radiance;
         is_cached = bool(radiance);
+        if (is_cached && (bsdf.flags() & (kGlossy | kSpecular))) bsdf.favour(kDiffuse, kDiffuseShare);
       }
       if (is_cached && !(bsdf.flags() & kGlossy)) query.world_share = sky_share_;
       const auto scattered = [&](const LightSample& light, const LobeEval& e) {
@@ -155,54 +180,83 @@ void IrradianceCacheIntegrator::trace(const RenderContext& context, const Film& 
       add(path.throughput, sample_direct_light(context, query, point, bsdf, kMode, u_light_choice, u_light, pdf_of, scattered), depth + 1);
     }
 
-    // Draw the next direction.
-    const auto next = bsdf.sample(point.wo, u, u_lobe);
-    if (!next || !(next->pdf_dir > 0.0f)) break;
-    const bool transparent = next->flags & kTransparent;
-    if (!may_scatter && !transparent) break;
-    if (transparent) {
-      const Rgb weight = next->value / next->pdf_dir;
-      path.throughput *= weight, walk.to_luminaires *= weight, walk.to_known_sky *= weight, walk.to_excess *= weight;
-      if (!advance(path.state, next->flags, limits_)) break;
-      path.pass(point, bsdf, *next, hit->t);
-      continue;
+    // Go on; where light is not known, as on metal, in several directions: elsewhere there is hardly any noise.
+    const Arrival here{point, bsdf, query, hit->t, is_cached, may_mirror};
+    if (walk.may_branch && walk.may_scatter && !bsdf.is_delta() && !(bsdf.flags() & kTransparent)) {
+      walk.may_branch = false;
+      if (!is_cached) {
+        ++walk.bounce;
+        branch_off(context, film, camera, here, walk, sampler, result);
+        break;
+      }
     }
-    path.travelled += hit->t;
-
-    // Follow it: to luminaires by all lobes, to all else by those that are not in the cache.
-    const bool delta = next->flags & kSpecular;
-    const Rgb weight = next->value / next->pdf_dir;
-    walk.to_luminaires = path.throughput * weight;
-    walk.to_known_sky = Rgb();
-    if (delta) {
-      walk.mirrors *= weight;
-      walk.to_excess = may_mirror ? walk.to_excess : Rgb();
-      path.throughput *= weight;
-    } else {
-      const Rgb known = is_cached ? bsdf.eval(point.wo, next->wi, kDiffuseLobes).value / next->pdf_dir : Rgb();
-      walk.to_known_sky = path.throughput * known;
-      walk.mirrors = Rgb(1.0f);
-      walk.to_excess = records_.level_of(point.path) == 0 ? path.throughput * known : Rgb();
-      path.throughput *= positive(weight - known);
-    }
-    walk.by_mirror = delta;
-    if (walk.is_over()) break;
-    may_scatter = advance(path.state, next->flags, limits_);
-    const FilmSpec& spec = film.spec();
-    if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
-      path.seen_from_camera = false;
-    path.state.without = next->flags & kDiffuse ? no_caustics_ : 0;
-    path.origin = {query, delta ? kInf : next->pdf_dir};
-    if (!delta) least_pdf = std::min(least_pdf, next->pdf_dir);
-    path.ray = ray_from(point, next->wi);
-
-    // Russian roulette for all but luminaires, which the next ray meets anyway.
-    const float alpha = std::min(1.0f, std::sqrt(max_component(max(path.throughput, abs(walk.to_excess)))));
-    if (alpha < 1.0f) {
-      const float kept = sampler.next_1d() < alpha ? 1.0f / alpha : 0.0f;
-      path.throughput *= kept, walk.to_excess *= kept;
-    }
+    if (!scatter(film, here, u, u_lobe, walk, sampler)) break;
   }
+}
+
+void IrradianceCacheIntegrator::branch_off(const RenderContext& context, const Film& film, const CameraRay& camera, const Arrival& from,
+                                           Walk walk, const Sampler& sampler, PixelSample& result) const {
+  walk.share(branches_);
+  for (int k = 0; k < branches_; ++k) {
+    Walk branch = walk;
+    Sampler own = sampler.branch(uint32_t(k), uint32_t(branches_));
+    own.jump_to(walk.bounce);
+    const Vec2 u = own.next_2d();
+    if (!scatter(film, from, u, own.next_1d(), branch, own)) continue;
+    trace(context, film, camera, branch, own, result);
+  }
+}
+
+bool IrradianceCacheIntegrator::scatter(const Film& film, const Arrival& from, Vec2 u, float u_lobe, Walk& walk, Sampler& sampler) const {
+  const auto& [point, bsdf, query, distance, is_cached, may_mirror] = from;
+  CameraPath& path = walk.path;
+  const auto next = bsdf.sample(point.wo, u, u_lobe);
+  if (!next || !(next->pdf_dir > 0.0f)) return false;
+  const bool transparent = next->flags & kTransparent;
+  if (!walk.may_scatter && !transparent) return false;
+  if (transparent) {
+    const Rgb weight = next->value / next->pdf_dir;
+    path.throughput *= weight, walk.to_luminaires *= weight, walk.to_known_sky *= weight, walk.to_excess *= weight;
+    if (!advance(path.state, next->flags, limits_)) return false;
+    path.pass(point, bsdf, *next, distance);
+    return true;
+  }
+  path.travelled += distance;
+
+  // Follow it: to luminaires by all lobes, to all else by those that are not in the cache.
+  const bool delta = next->flags & kSpecular;
+  const Rgb weight = next->value / next->pdf_dir;
+  walk.to_luminaires = path.throughput * weight;
+  walk.to_known_sky = Rgb();
+  if (delta) {
+    walk.mirrors *= weight;
+    walk.to_excess = may_mirror ? walk.to_excess : Rgb();
+    path.throughput *= weight;
+  } else {
+    const Rgb known = is_cached ? bsdf.eval(point.wo, next->wi, kDiffuseLobes).value / next->pdf_dir : Rgb();
+    walk.to_known_sky = path.throughput * known;
+    walk.mirrors = Rgb(1.0f);
+    walk.to_excess = records_.level_of(point.path) == 0 ? path.throughput * known : Rgb();
+    path.throughput *= positive(weight - known);
+  }
+  walk.by_mirror = delta;
+  if (walk.is_over()) return false;
+  walk.may_scatter = advance(path.state, next->flags, limits_);
+  const FilmSpec& spec = film.spec();
+  if (!(spec.transparent_glass && (next->flags & kTransmission) && next->roughness <= spec.transparent_roughness))
+    path.seen_from_camera = false;
+  path.state.without = next->flags & kDiffuse ? no_caustics_ : 0;
+  path.origin = {query, delta ? kInf : next->pdf_dir};
+  if (!delta) walk.least_pdf = std::min(walk.least_pdf, next->pdf_dir);
+  path.ray = ray_from(point, next->wi);
+
+  // Russian roulette for all but luminaires, which the next ray meets anyway; of a branch as of the whole path.
+  const float alpha = std::min(1.0f, std::sqrt(walk.parts * max_component(max(path.throughput, abs(walk.to_excess)))));
+  if (alpha < 1.0f) {
+    const float kept = sampler.next_1d() < alpha ? 1.0f / alpha : 0.0f;
+    path.throughput *= kept, walk.to_excess *= kept;
+  }
+  return true;
 }
 
 }  // namespace
@@ -231,6 +285,8 @@ const Descriptor& irradiance_cache_descriptor() {
            "Radiance up to which light of the sky is cached, times the mean of the sky; what exceeds it, as the sun does, is sampled "
            "directly "
            "at every surface. 0 samples all of it directly: sharper, but grain in rooms"},
+          {"branches", "Branches", Kind::kInt, 4, 1, 64,
+           "Directions in which a path goes on from the first surface whose light is not cached, such as metal: most noise is there"},
           {"min_spacing", "Minimum Spacing", Kind::kFloat, 1.5, 0, 1e4,
            "For which a record holds at least: more is smoother where objects meet, and less true there", "px"},
           {"max_spacing", "Maximum Spacing", Kind::kFloat, 40, 1, 1e6,

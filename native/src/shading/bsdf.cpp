@@ -145,6 +145,18 @@ void Bsdf::choose(uint8_t kinds, Vec3 wo) {
   for (int i = 0; i < portal_count_; ++i) portals_[i].select *= scale;
 }
 
+void Bsdf::favour(uint8_t kinds, float share) {
+  float before = 0.0f, sum = 0.0f;
+  for (int i = 0; i < count_; ++i) {
+    Entry& e = entries_[i];
+    before += e.select;
+    if (e.flags & kinds & kKinds) e.select *= share;
+    sum += e.select;
+  }
+  if (!(sum > 0.0f)) return;
+  for (int i = 0; i < count_; ++i) entries_[i].select *= before / sum;
+}
+
 void Bsdf::hold_out() {
   count_ = subsurface_count_ = portal_count_ = 0;
   emission = Rgb(), holdout = Rgb(1.0f) - transparency;

@@ -92,6 +92,8 @@ class Bsdf {
   // Lobes of other kinds than `kinds` (kDiffuse, kGlossy, kSpecular, and kTransparent) are neither evaluated nor sampled from now
   // on. After finish(), any number of times.
   void choose(uint8_t kinds, Vec3 wo);
+  // Lobes of `kinds` are sampled `share` times as often, compared with others: values stay, densities do not. After finish().
+  void favour(uint8_t kinds, float share);
   // Turns the whole surface, but for what it lets through, into a hole of the picture. After finish().
   void hold_out();
 
