@@ -73,7 +73,7 @@ class Refiner:
         self._wake = threading.Condition()
         self._built: tuple | None = None  # the Scene, and what the native side made of it
         self._last: Session | None = None  # which knows of light in the scene, by caches and photons
-        self._job: Job | None = None  # at work
+        self._job: Job | None = None  # at work, or done
         self._cleaner = Cleaner()
         self._first = FirstPicture()
         self._patience = PATIENCE
@@ -85,6 +85,14 @@ class Refiner:
         with self._wake:
             self._wish = job
             self.starts += 1
+            self._wake.notify()
+
+    def pause(self, paused: bool) -> None:
+        """What is at work stops after its sample, and goes on from there."""
+        with self._wake:
+            for job in (self._job, self._wish):
+                if job is not None:
+                    job.paused = paused
             self._wake.notify()
 
     def close(self, wait: bool = True) -> None:
@@ -106,11 +114,11 @@ class Refiner:
     def _work(self) -> None:
         while not self._closed:
             with self._wake:
-                while self._wish is None and not self._closed:
+                while (self._wish is None or self._wish.paused) and not self._closed:
                     self._wake.wait()
                 job, self._wish = self._wish, None
                 self._job = job
-            if job is None or job.paused:
+            if job is None or self._closed:
                 continue
             try:
                 self.error = ""
@@ -154,8 +162,10 @@ class Refiner:
         scene = dataclasses.replace(job.scene, camera=job.camera, film=reduced(job.film, scale))
         session = self._last = Session(scene, settings, built=self._built[1], earlier=self._knowing(settings))
         shown, clean_at = 0, job.start_sample
+        session.native.pause(job.paused)
         with session:
             while True:
+                session.native.pause(job.paused)
                 done = session.native.wait(POLL_SECONDS)
                 if self._outdated() and not (is_first and self._finishes(started)):
                     session.native.cancel()

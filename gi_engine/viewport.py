@@ -56,10 +56,12 @@ class Viewport:
         engine.update_stats("", self.status(picture))
 
     def submit(self, job: Job) -> None:
-        """Nothing begins anew that is as it was."""
+        """Nothing begins anew that is as it was, a pause between or not."""
         if not same_job(job, self.job):
             self.job = job
             self.refiner.show(job)
+        elif job.paused != self.job.paused:
+            self.refiner.pause(job.paused)
 
     def wanted(self, context, depsgraph) -> Job:
         scene, layer, region = depsgraph.scene_eval, depsgraph.view_layer_eval, context.region
@@ -125,7 +127,7 @@ def same_job(a: Job, b: Job | None) -> bool:
 
 
 def rest(job: Job) -> tuple:
-    return job.film, job.settings, job.shown, job.start_sample, job.paused
+    return job.film, job.settings, job.shown, job.start_sample
 
 
 def region_of(context, film: Film) -> tuple[int, int, int, int]:

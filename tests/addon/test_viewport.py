@@ -98,6 +98,39 @@ def test_what_is_newer_replaces_what_is_worked_on(job):
     refiner.close()
 
 
+def test_a_pause_ends_where_it_began(job):
+    refiner = Refiner(lambda: True)
+    endless = dataclasses.replace(job, settings=dataclasses.replace(job.settings, samples=1 << 20))
+    refiner.show(endless)
+    wait_for(lambda: refiner.picture and refiner.picture.samples > 2)
+    refiner.pause(True)
+    time.sleep(0.3)  # the sample under way
+    held = refiner.picture
+    time.sleep(0.3)
+    assert refiner.picture is held
+    refiner.pause(False)
+    wait_for(lambda: refiner.picture is not held)
+    assert refiner.picture.samples > held.samples and refiner.starts == 1
+    refiner.close()
+
+
+def test_what_changes_in_a_pause_is_shown_after_it(job):
+    refiner = Refiner(lambda: True)
+    refiner.show(job)
+    wait_for(lambda: refiner.picture and refiner.picture.samples == 3)
+    refiner.pause(True)
+    held, other = refiner.picture, dataclasses.replace(turned(job, 1), paused=True)
+    refiner.show(other)
+    time.sleep(0.3)
+    assert refiner.picture is held
+    refiner.pause(False)
+    wait_for(lambda: refiner.picture.job is other and refiner.picture.samples == 3)
+    refiner.pause(True)
+    refiner.show(dataclasses.replace(turned(job, 2), paused=True))
+    refiner.close()  # nor does a pause keep anybody waiting
+    assert not refiner.error
+
+
 def turned(job, k):
     """The same, a little to the side."""
     matrix = job.camera.matrix.copy()
@@ -330,7 +363,7 @@ def test_nothing_waits_for_the_denoiser(job, monkeypatch, ends):
 
 def test_the_same_job_is_not_begun_again(job):
     again = dataclasses.replace(job, camera=dataclasses.replace(job.camera, matrix=job.camera.matrix.copy()))
-    assert viewport.same_job(again, job)
+    assert viewport.same_job(again, job) and viewport.same_job(dataclasses.replace(again, paused=True), job)
     again.camera.matrix[0, 3] += 1
     assert not viewport.same_job(again, job) and not viewport.same_job(job, None)
 

@@ -256,9 +256,11 @@ def paused():
     scene = bpy.context.scene
     yield from settled("before the pause")
     before = pixels()
-    engine_module("viewport")
-    scene.gi_engine.preview_pause = True
-    yield 0.5
+    begun = starts()
+    for pause in (True, False, True):
+        scene.gi_engine.preview_pause = pause
+        yield 0.5
+    assert starts() == begun, "a pause begins anew"
     edit("while paused", lambda: setattr(meshes()[0], "location", (0.3, 0, 0)))
     yield 1.5
     (view,) = ours()

@@ -259,7 +259,9 @@ void bind_render(nb::module_& m) {
       .def("kept", &kept_tables, "Once ended: what another render of the scene may take over, float32 tables (rows, columns) by name.")
       .def("start", &Session::start, nb::call_guard<nb::gil_scoped_release>())
       .def("wait", &Session::wait, nb::arg("seconds"), nb::call_guard<nb::gil_scoped_release>(), "True once the render has ended.")
-      .def("cancel", &Session::cancel)
+      .def("cancel", &Session::cancel, nb::call_guard<nb::gil_scoped_release>())
+      .def("pause", &Session::pause, nb::arg("on"), nb::call_guard<nb::gil_scoped_release>(),
+           "Stops after the pass under way, or goes on from there. What time it takes is not counted.")
       .def("progress", &progress_dict)
       .def(
           "messages", [](const BoundSession& s) { return s.log().texts(); }, "What the integrator has to say of the scene, for the user.")

@@ -61,7 +61,24 @@ Kept Session::kept() const {
   return integrator_->keep();
 }
 
-void Session::cancel() { cancelled_ = true; }
+void Session::cancel() {
+  const std::lock_guard lock(mutex_);
+  cancelled_ = true;
+  woken_.notify_all();
+}
+
+void Session::pause(bool on) {
+  const std::lock_guard lock(mutex_);
+  paused_ = on;
+  woken_.notify_all();
+}
+
+double Session::wait_while_paused() {
+  const double since = now();
+  std::unique_lock lock(mutex_);
+  woken_.wait(lock, [this] { return !paused_ || cancelled_; });
+  return now() - since;
+}
 
 bool Session::wait(double seconds) {
   std::unique_lock lock(mutex_);
@@ -94,11 +111,13 @@ void Session::run() {
                                 settings_.samples,
                                 path_,
                                 steady_};
-    const double start = now();
+    double start = now();
     integrator_->prepare(context);
     float noise = kInf;
     int next_check = 16;  // passes; fewer say nothing of noise
     for (int pass = 0; !cancelled_; ++pass) {
+      if (paused_) start += wait_while_paused();
+      if (cancelled_) break;
       {
         const std::lock_guard lock(mutex_);
         tiles_done_ = 0;

@@ -50,6 +50,7 @@ class Session {
   void start();
   bool wait(double seconds);  // true once it has ended
   void cancel();
+  void pause(bool on);  // once the pass under way has ended; the time that it takes does not count
   Progress progress() const;
   const Film& film() const { return film_; }
   const Log& log() const { return log_; }
@@ -59,6 +60,7 @@ class Session {
  private:
   void run();
   bool enough(int passes, double seconds, float noise) const;
+  double wait_while_paused();  // seconds
 
   const LitScene& lit_;
   const Scene& scene_;
@@ -69,12 +71,12 @@ class Session {
   std::unique_ptr<const Lightmap> lightmap_;
   RenderSettings settings_;
   std::unique_ptr<Integrator> integrator_;
-  std::atomic<bool> cancelled_{false};
+  std::atomic<bool> cancelled_{false}, paused_{false};
   std::atomic<int> tiles_done_{0};
   Log log_;
   std::thread thread_;
   mutable std::mutex mutex_;
-  std::condition_variable ended_;
+  std::condition_variable ended_, woken_;
   Progress progress_;
   double pass_started_ = 0;
   std::atomic<uint64_t> rays_before_{0};
