@@ -6,6 +6,7 @@
 #include "core/point_tree.h"
 #include "film/film.h"
 #include "transport/light_path.h"
+#include "transport/photon_aim.h"
 #include "transport/subpath.h"
 #include "transport/surface_disc.h"
 
@@ -47,6 +48,9 @@ enum PhotonClass : uint8_t {
   kAllPhotons = 7,
 };
 
+// The part of a vertex's power that is of the wished classes, and not thrown by lobes that diffuse surfaces are told not to see.
+Rgb photon_power(const LightVertex& v, const SubpathSettings& settings, uint8_t classes);
+
 // Sends out the `count` light paths of a pass, and keeps what they leave of the wished classes (bits of PhotonClass). All light is that of
 // the photons over `count`. The order is that of the paths.
 std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes);
@@ -54,19 +58,6 @@ std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSet
 // The squared radius of a pass over the first one's, where each is to keep `alpha` of the photons of a disc: ∏ (i + α) / (i + 1).
 // [Knaus & Zwicker 2011, eq. 15]
 double shrinking(int pass, double alpha);
-
-// Where an eye path ends on a diffuse surface, and the normal of the side that it came to.
-struct PathEnd {
-  Vec3 position, normal;
-};
-// Of `across` x `across` paths, after gathering or without.
-constexpr int kLooksAcross = 48;  // what shows where light is wanted
-std::vector<PathEnd> find_ends(const RenderContext& context, const Film& film, const BounceLimits& limits, bool gathers, int across);
-SeenPoints seen_points(const std::vector<PathEnd>& ends, ThreadPool& pool);
-
-// Learns to send photons of `classes` to what is seen.
-EmissionGuide learn_emission(const RenderContext& context, const SubpathSettings& settings, int photons, uint8_t classes,
-                             const std::vector<PathEnd>& seen);
 
 // Whether what lies `away` is taken to be of the same surface: of like slope, and not off the plane. Its normal may have any length.
 inline bool of_one_surface(Vec3 away, Vec3 its_normal, Vec3 normal, float radius) {
