@@ -247,19 +247,17 @@ def principled_emission(b, weight, below) -> None:
 
 # -------------------------------------------------------------------- below the surface
 
-WALK, WALK_LEGACY, WALK_SKIN = range(3)
+WALK, WALK_LEGACY, WALK_SKIN, PROFILE = range(4)
 
 
 def subsurface_method(b, name: str, shows: bool = True) -> int:
-    """What the node's method is walked as. The random walk of files from before "legacy" was told apart is the legacy one."""
+    """The random walk of files from before "legacy" was told apart is the legacy one."""
     method = getattr(b.node, name)
     if shows:
         b.need("subsurface")
-    if method == "BURLEY" and shows:
-        b.warn("Christensen-Burley is rendered as a random walk of the same radius")
     known = b.node.bl_rna.properties[name].enum_items.keys()
     legacy = WALK_LEGACY if "RANDOM_WALK_LEGACY" not in known else WALK
-    return {"RANDOM_WALK": legacy, "RANDOM_WALK_SKIN": WALK_SKIN}.get(method, WALK_LEGACY)
+    return {"RANDOM_WALK": legacy, "RANDOM_WALK_SKIN": WALK_SKIN, "BURLEY": PROFILE}.get(method, WALK_LEGACY)
 
 
 @closure_rule("ShaderNodeSubsurfaceScattering")

@@ -1,12 +1,12 @@
 """Rules of the nodes of volumes: coefficients per metre, as one closure op. No bpy.
 
-On surfaces they render black, as in Cycles. Fournier and Forand's phase function has its fallback here."""
+On surfaces they render black, as in Cycles."""
 
 from __future__ import annotations
 
 from .rules import closure_rule
 
-PHASES = {"HENYEY_GREENSTEIN": 0, "RAYLEIGH": 1, "DRAINE": 2, "MIE": 3}
+PHASES = {"HENYEY_GREENSTEIN": 0, "RAYLEIGH": 1, "DRAINE": 2, "MIE": 3, "FOURNIER_FORAND": 4}
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 
@@ -46,11 +46,13 @@ def without(b, color):
 
 
 def phase_inputs(b) -> tuple:
-    """Anisotropy, the phase function's other number, and which it is."""
+    """The phase function's two numbers, and which it is."""
     phase = getattr(b.node, "phase", "HENYEY_GREENSTEIN")
     if phase not in PHASES:
-        b.warn(f"{phase.replace('_', ' ').title()} is scattered as Henyey-Greenstein of anisotropy 0.9")
-        return 0.9, 0.0, 0
+        b.warn(f"the phase function {phase.replace('_', ' ').title()} is not known: Henyey-Greenstein's is used")
+        return b.input("Anisotropy"), 0.0, 0
+    if phase == "FOURNIER_FORAND":
+        return b.input("Backscatter"), b.input("IOR"), PHASES[phase]
     extra = {"DRAINE": "Alpha", "MIE": "Diameter"}.get(phase)
     return b.input("Anisotropy"), b.input(extra) if extra else 0.0, PHASES[phase]
 

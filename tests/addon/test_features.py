@@ -68,17 +68,17 @@ def test_integrators_say_which_caustics_they_cannot_switch_off(skin):
 
 def test_approximated_nodes_are_counted(skin):
     tree = skin.node_tree
-    below = tree.nodes.new("ShaderNodeSubsurfaceScattering")
-    below.falloff = "BURLEY"
-    tree.links.new(below.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    glow, empty = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeTexImage")
+    tree.links.new(empty.outputs["Color"], glow.inputs["Color"])
+    tree.links.new(glow.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
     found = exported("path")
     assert approximated(found.scene) == ['"Skin": 1 node approximated']
-    assert len(approximations.of("Skin")) == 1 and "Burley" in approximations.of("Skin")[0]
-    volume = tree.nodes.new("ShaderNodeVolumeScatter")
-    volume.phase = "FOURNIER_FORAND"
+    assert len(approximations.of("Skin")) == 1 and "magenta" in approximations.of("Skin")[0]
+    volume, around = tree.nodes.new("ShaderNodeVolumeScatter"), tree.nodes.new("ShaderNodeTexEnvironment")
+    tree.links.new(around.outputs["Color"], volume.inputs["Color"])
     tree.links.new(volume.outputs[0], tree.nodes["Material Output"].inputs["Volume"])
     warnings = [text for text in exported("path").warnings if "Skin" in text]
-    assert len(warnings) == 1 and "2 nodes approximated" in warnings[0] and "Fournier" in warnings[0]
+    assert len(warnings) == 1 and "2 nodes approximated" in warnings[0] and "Environment" in warnings[0]
     tree.links.remove(tree.nodes["Material Output"].inputs["Volume"].links[0])
     tree.links.new(tree.nodes["Principled BSDF"].outputs[0], tree.nodes["Material Output"].inputs["Surface"])
     exported("path")

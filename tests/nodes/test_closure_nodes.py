@@ -198,9 +198,10 @@ def test_fallbacks_say_so_once(shader, idname, ops):
     assert "'Odd one'" in shader.warnings[0]
 
 
-def test_subsurface_is_walked(shader):
-    assert shader.ops(shader.new("ShaderNodeSubsurfaceScattering")) == ["subsurface"]
-    shader.compile(shader.new("ShaderNodeBsdfPrincipled", {"Subsurface Weight": 0.3}))
+@pytest.mark.parametrize("method", ["RANDOM_WALK", "RANDOM_WALK_SKIN", "BURLEY"])
+def test_light_below_surfaces_needs_no_fallback(shader, method):
+    assert shader.ops(shader.new("ShaderNodeSubsurfaceScattering", falloff=method)) == ["subsurface"]
+    shader.compile(shader.new("ShaderNodeBsdfPrincipled", {"Subsurface Weight": 0.3}, subsurface_method=method))
     assert not shader.warnings
 
 

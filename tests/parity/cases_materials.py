@@ -280,12 +280,17 @@ def skin_and_marble(scene):
         "marble": principled(Base_Color=(0.9, 0.85, 0.8), Subsurface_Weight=1.0, Subsurface_Scale=0.3),
         "jelly": of("ShaderNodeSubsurfaceScattering", {"falloff": "RANDOM_WALK"}, Color=RED, Scale=0.5, Anisotropy=0.6),
         "skin": of("ShaderNodeSubsurfaceScattering", {"falloff": "RANDOM_WALK_SKIN"}, Color=(0.8, 0.5, 0.4), Scale=0.1),
+        "wax": of(
+            "ShaderNodeBsdfPrincipled",
+            {"subsurface_method": "BURLEY"},
+            **{"Base Color": BRASS, "Subsurface Weight": 0.8, "Subsurface Scale": 1.0},
+        ),
     }
     for i, (name, look) in enumerate(looks.items()):
-        ball(look(name), 0.4, rings=16, location=(i - 1.0, 0.0, 0.4), scale=(1.0, 0.3, 1.0))
+        ball(look(name), 0.4, rings=16, location=(i - 1.5, 0.0, 0.4), scale=(1.0, 0.3, 1.0))
     lamp("AREA", (0.0, 2.5, 1.0), (-1.4, 0.0, 0.0), 120.0, shape="SQUARE", size=1.0, color=LAMP)
     world(SKY, 0.3)
-    camera((0, -4, 1.5), (0, 0, 0.4), 40.0)
+    camera((0, -4, 1.5), (0, 0, 0.4), 50.0)
 
 
 def portal(name, beside=(0.0, 0.0, 0.0), direction=None, color=(0.9, 0.8, 0.7), rest=0.0):

@@ -17,7 +17,9 @@ def has(*names):
 
 
 FEATURES = {
-    "Subsurface scattering by random walk (else diffuse of the same albedo)": lambda d: "subsurface" in d["carries"],
+    "Subsurface scattering by random walk and by profile (else diffuse of the same albedo)": lambda d: (
+        "subsurface" in d["carries"]
+    ),
     "Volumes that only absorb, evenly or not, in objects and the world (else left out)": lambda d: (
         "absorption" in d["carries"]
     ),

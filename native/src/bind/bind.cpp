@@ -24,6 +24,7 @@ NB_MODULE(_core, m) {
   gi::bind::bind_lights(m);
   gi::bind::bind_guide(m);
   gi::bind::bind_points(m);
+  gi::bind::bind_scattering(m);
   gi::bind::bind_connections(m);
   gi::bind::bind_hash(m);
   gi::bind::bind_irradiance(m);

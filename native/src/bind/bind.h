@@ -18,6 +18,7 @@ void bind_lights(nanobind::module_& m);
 void bind_guide(nanobind::module_& m);
 void bind_hash(nanobind::module_& m);
 void bind_points(nanobind::module_& m);
+void bind_scattering(nanobind::module_& m);
 void bind_connections(nanobind::module_& m);
 void bind_irradiance(nanobind::module_& m);
 

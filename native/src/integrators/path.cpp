@@ -197,7 +197,7 @@ class PathIntegrator final : public Integrator {
       // Light that goes below the surface comes out elsewhere, diffusely: that is where lights are looked for, and the next direction.
       if (next->flags & kSubsurface) {
         Sampler below = sampler.fork(bounce + kBelow);
-        const auto exit = walk_below(context.scene, point, bsdf.subsurface(next->which), below.fork(kBelow));
+        const auto exit = scatter_below(context.scene, point, bsdf.subsurface(next->which), below.fork(kBelow));
         if (!exit) break;
         path.throughput *= exit->weight;
         weight *= exit->weight;

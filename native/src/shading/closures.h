@@ -49,9 +49,11 @@ inline Anisotropy anisotropy(float roughness, float amount, float rotation, Vec3
   return {alpha / aspect, alpha * aspect, rotated(tangent, n, rotation * 2.0f * kPi)};
 }
 
-// `s.weight` has the albedo in it. Where light is not followed below the surface it is diffuse.
+// `s.weight` has the albedo in it. Where light is not followed below the surface it is diffuse; by profiles it is not, as in Cycles, where
+// a diffuse surface sees it: nobody could tell, and most rays that look for the surface miss it.
 inline void add_subsurface(ShadeState& state, const Subsurface& s, Vec3 n) {
-  if (!state.bsdf->carries_subsurface()) return add_diffuse(state, s.weight, s.albedo, 0.0f, n);
+  const bool untold = s.method == SubsurfaceMethod::kProfile && state.point.path.after_diffuse;
+  if (untold || !state.bsdf->carries_subsurface()) return add_diffuse(state, s.weight, s.albedo, 0.0f, n);
   state.bsdf->add_subsurface(s);
 }
 

@@ -2,7 +2,9 @@
 // Directions point away from the place, as at surfaces. Leaves out where media are (transport/media.h).
 #pragma once
 #include <optional>
+#include <variant>
 
+#include "shading/fournier_forand.h"
 #include "shading/lobes/lobe.h"
 #include "shading/phase.h"
 
@@ -12,14 +14,12 @@ class Medium {
  public:
   Rgb sigma_t, emission;  // per metre; radiance per metre
 
-  // Takes `sigma_s` out of the beam and scatters it by Draine's phase function. What comes after the fourth is scattered as the fourth.
+  // Takes `sigma_s` out of the beam and scatters it by Draine's phase function, or Fournier and Forand's. What comes after the fourth is
+  // scattered as the fourth.
   void add_scattering(Rgb sigma_s, float g, float alpha) {
-    sigma_s = within_limits(sigma_s);
-    sigma_t += sigma_s;
-    if (is_black(sigma_s)) return;
-    if (count_ == kMost) return void(lobes_[kMost - 1].sigma_s += sigma_s);
-    lobes_[count_++] = {sigma_s, std::clamp(g, -0.999f, 0.999f), std::max(alpha, 0.0f)};
+    add_lobe(within_limits(sigma_s), DrainePhase{std::clamp(g, -0.999f, 0.999f), std::max(alpha, 0.0f)});
   }
+  void add_scattering(Rgb sigma_s, const FournierForand& phase) { add_lobe(within_limits(sigma_s), phase); }
   void add_absorption(Rgb sigma_a) { sigma_t += within_limits(sigma_a); }
   void add(const Medium& other) {
     sigma_t += other.sigma_t, emission += other.emission;
@@ -60,8 +60,13 @@ class Medium {
     const float cosine = -dot(wo, wi), all = total();
     for (int i = 0; i < count_; ++i) {
       const Lobe& l = lobes_[i];
-      e.value += l.sigma_s * draine(cosine, l.g, l.alpha);
-      e.pdf_dir += average(l.sigma_s) / all * drawn(cosine, l);
+      float density, pdf;
+      if (const auto* dust = std::get_if<DrainePhase>(&l.phase))
+        density = dust->density(cosine), pdf = dust->pdf(cosine);
+      else
+        density = pdf = std::get<FournierForand>(l.phase).density(cosine);
+      e.value += l.sigma_s * density;
+      e.pdf_dir += average(l.sigma_s) / all * pdf;
     }
     return e;
   }
@@ -71,8 +76,8 @@ class Medium {
       const Lobe& l = lobes_[i];
       left -= average(l.sigma_s);
       if (left > 0.0f && i + 1 < count_) continue;
-      const bool flat = is_flat(l);
-      const Vec3 wi = sample_henyey_greenstein(-wo, flat ? 0.0f : l.g, u);
+      const auto* dust = std::get_if<DrainePhase>(&l.phase);
+      const Vec3 wi = dust ? dust->sample(-wo, u) : around(-wo, std::get<FournierForand>(l.phase).sample(u.x), u.y);
       const LobeEval e = eval(wo, wi);
       return LobeSample{wi, e.value, e.pdf_dir, 0, 1.0f};
     }
@@ -82,13 +87,16 @@ class Medium {
  private:
   struct Lobe {
     Rgb sigma_s;
-    float g, alpha;
+    std::variant<DrainePhase, FournierForand> phase;
   };
   static constexpr int kMost = 4;
   static Rgb within_limits(Rgb sigma) { return min(positive(sigma), Rgb(1e9f)); }
-  // Henyey and Greenstein's part is drawn; where there is little of it, all directions alike.
-  static bool is_flat(const Lobe& l) { return std::abs(l.g) < 0.05f; }
-  static float drawn(float cosine, const Lobe& l) { return henyey_greenstein(cosine, is_flat(l) ? 0.0f : l.g); }
+  void add_lobe(Rgb sigma_s, const std::variant<DrainePhase, FournierForand>& phase) {
+    sigma_t += sigma_s;
+    if (is_black(sigma_s)) return;
+    if (count_ == kMost) return void(lobes_[kMost - 1].sigma_s += sigma_s);
+    lobes_[count_++] = {sigma_s, phase};
+  }
   float total() const {
     float sum = 0.0f;
     for (int i = 0; i < count_; ++i) sum += average(lobes_[i].sigma_s);

@@ -31,6 +31,17 @@ inline float draine(float cosine, float g, float alpha) {
   return 0.25f * kInvPi * (1.0f - g2) * (1.0f + alpha * cosine * cosine) / ((1.0f + alpha * (1.0f + 2.0f * g2) / 3.0f) * d * std::sqrt(d));
 }
 
+// Henyey and Greenstein's part of it is drawn; where there is little of it, all directions alike.
+struct DrainePhase {
+  float g = 0, alpha = 0;
+  float density(float cosine) const { return draine(cosine, g, alpha); }
+  float pdf(float cosine) const { return henyey_greenstein(cosine, drawn_g()); }  // of what `sample` gives
+  Vec3 sample(Vec3 direction, Vec2 u) const { return sample_henyey_greenstein(direction, drawn_g(), u); }
+
+ private:
+  float drawn_g() const { return std::abs(g) < 0.05f ? 0.0f : g; }
+};
+
 // Water drops by their diameter (micrometres): a mix of both. [Jendersie & d'Eon 2023, "An approximate Mie scattering function"]
 struct MieFit {
   float g_henyey, g_draine, alpha, share_draine;

@@ -25,6 +25,7 @@ struct PathState {  // of the ray that arrived
   int16_t depth = 0, diffuse_depth = 0, glossy_depth = 0, transmission_depth = 0, transparent_depth = 0, portal_depth = 0, volume_depth = 0;
   float ray_length = 0;
   uint8_t without = 0;  // CausticFlags: lobes that are left out at the next surface
+  bool after_diffuse = false;  // somewhere on the way a surface scattered diffusely
   float least_pdf = 1e30f;  // of the directions so far, per steradian: how blurred the path's last surface is seen
 };
 

@@ -69,7 +69,7 @@ SubsurfaceMedium medium_of(const Subsurface& s) {
   const bool legacy = s.method != SubsurfaceMethod::kWalk && s.anisotropy >= 0.0f;
   for (int i = 0; i < 3; ++i) {
     float radius = s.radius[i];
-    if (s.method == SubsurfaceMethod::kWalkLegacy) radius *= 0.25f * kInvPi;
+    if (s.method == SubsurfaceMethod::kWalkLegacy) radius *= kLegacyRadius;
     if (s.method == SubsurfaceMethod::kSkin) radius *= skin_radius_scale(s.albedo[i], s.ior);
     m.sigma_t[i] = 1.0f / std::max(radius, kSmallest);
     if (legacy) m.sigma_t[i] /= 1.0f - s.anisotropy;

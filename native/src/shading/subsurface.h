@@ -1,11 +1,11 @@
-// Light that enters a surface and leaves it elsewhere: what a material says of it, and the medium that a random walk goes through.
-// The walk itself is transport/subsurface.h. Leaves out Christensen and Burley's profile, which is walked as the others.
+// Light that enters a surface and leaves it elsewhere: what a material says of it, and the medium that a random walk goes through, or the
+// lengths of the profile by which it is spread. How it gets there is transport/subsurface.h.
 #pragma once
 #include "core/vec.h"
 
 namespace gi {
 
-enum class SubsurfaceMethod : uint8_t { kWalk, kWalkLegacy, kSkin };  // what immediates mean by them
+enum class SubsurfaceMethod : uint8_t { kWalk, kWalkLegacy, kSkin, kProfile };  // what immediates mean by them
 
 struct Subsurface {
   Rgb weight;          // of the light that comes out, the albedo included
@@ -36,6 +36,16 @@ float single_albedo_legacy(float color, float g);
 // Mean free path of a skin from the radius of its diffuse profile. [Jensen et al. 2001, "A practical model for subsurface light transport"]
 float skin_radius_scale(float albedo, float ior);
 
+// Of older files, whose radii were of other profiles, that it looks as it did.
+inline constexpr float kLegacyRadius = 0.25f * kInvPi;
+
 SubsurfaceMedium medium_of(const Subsurface& s);
+
+// Of each channel's DiffusionProfile, metres. As in Cycles the albedo has no say in them.
+inline Rgb profile_lengths(const Subsurface& s) {
+  Rgb d;
+  for (int i = 0; i < 3; ++i) d[i] = s.weight[i] > 0.0f ? s.radius[i] * kLegacyRadius : 0.0f;
+  return d;
+}
 
 }  // namespace gi

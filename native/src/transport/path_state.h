@@ -30,7 +30,7 @@ inline bool advance(PathState& path, uint8_t flags, const BounceLimits& limits) 
     path.kind = kRayReflection;
     within = (flags & kDiffuse ? ++path.diffuse_depth <= limits.diffuse : ++path.glossy_depth <= limits.glossy) && within;
   }
-  if (flags & kDiffuse) path.least_pdf = std::min(path.least_pdf, kInvPi);  // or less: where the density is not told
+  if (flags & kDiffuse) path.after_diffuse = true, path.least_pdf = std::min(path.least_pdf, kInvPi);  // or less: where it is not told
   path.kind |= flags & kDiffuse ? kRayDiffuse : flags & kGlossy ? kRayGlossy : uint32_t(kRayGlossy | kRaySingular);
   return within;
 }

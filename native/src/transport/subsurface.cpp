@@ -6,6 +6,7 @@
 #include "shading/lobes/microfacet_distribution.h"
 #include "shading/phase.h"
 #include "transport/path_state.h"
+#include "transport/subsurface_probe.h"
 
 namespace gi {
 namespace {
@@ -52,10 +53,8 @@ SubsurfaceExit leave(const Scene& scene, const ShadingPoint& entry, const Subsur
   PathState state = entry.path;
   state.ray_length = hit.t;
   const ShadingPoint point = scene.surface_point(hit.instance, hit.triangle, hit.b1, hit.b2, direction, state, entry.footprint);
-  return {point, surface.normal == entry.ns ? point.ns : bent_normal(scene, point), weight};
+  return {point, exit_normal(scene, entry, surface, point), weight};
 }
-
-}  // namespace
 
 std::optional<SubsurfaceExit> walk_below(const Scene& scene, const ShadingPoint& entry, const Subsurface& surface, Sampler sampler) {
   if (entry.strand != kNoId) return {};  // as Cycles has it, nothing comes out of a curve
@@ -84,6 +83,17 @@ std::optional<SubsurfaceExit> walk_below(const Scene& scene, const ShadingPoint&
     position += direction * reach;
   }
   return {};
+}
+
+}  // namespace
+
+Vec3 exit_normal(const Scene& scene, const ShadingPoint& entry, const Subsurface& surface, const ShadingPoint& exit) {
+  return surface.normal == entry.ns ? exit.ns : bent_normal(scene, exit);
+}
+
+std::optional<SubsurfaceExit> scatter_below(const Scene& scene, const ShadingPoint& entry, const Subsurface& surface, Sampler sampler) {
+  const bool by_profile = surface.method == SubsurfaceMethod::kProfile;
+  return by_profile ? probe_below(scene, entry, surface, sampler) : walk_below(scene, entry, surface, sampler);
 }
 
 }  // namespace gi

@@ -1,5 +1,5 @@
-// Random walks below a surface: light that enters an object here leaves it somewhere else. The medium is homogeneous and the object's
-// own surface its only border. [Kulla & Conty 2017, "Revisiting physically based shading"]
+// Light that enters an object here leaves it somewhere else: by a random walk through a homogeneous medium, of which the object's own
+// surface is the only border [Kulla & Conty 2017, "Revisiting physically based shading"], or by a profile (subsurface_probe.h).
 #pragma once
 #include "core/sampler.h"
 #include "scene/scene.h"
@@ -21,7 +21,10 @@ inline void set_exit(const SubsurfaceExit& exit, Bsdf& bsdf) {
   bsdf.finish(exit.point.wo);
 }
 
-// Nothing where the walk is absorbed, or leaves through a hole.
-std::optional<SubsurfaceExit> walk_below(const Scene& scene, const ShadingPoint& entry, const Subsurface& surface, Sampler sampler);
+// The normal there, bent where the material bends it where light enters.
+Vec3 exit_normal(const Scene& scene, const ShadingPoint& entry, const Subsurface& surface, const ShadingPoint& exit);
+
+// As the surface's method says. Nothing where light is absorbed, or leaves through a hole.
+std::optional<SubsurfaceExit> scatter_below(const Scene& scene, const ShadingPoint& entry, const Subsurface& surface, Sampler sampler);
 
 }  // namespace gi
