@@ -41,3 +41,13 @@ def tangents_are_undisplaced() -> bool:
 def thickness_is_unscaled() -> bool:
     """Up to Blender 4.5 the thickness of curves, which their nodes ask for, is that of the object before it is scaled."""
     return bpy.app.version < (5, 0, 0)
+
+
+def hair_on_meshes_heeds_their_sides() -> bool:
+    """From Blender 5.0 on Cycles leaves out light of Principled Hair on meshes that is on the one side of the surface and the other of the hair."""
+    return bpy.app.version >= (5, 0, 0)
+
+
+def ies_ends_in_darkness() -> bool:
+    """Up to Blender 4.5 the curves of IES files bend towards 0 at the last angles."""
+    return bpy.app.version < (5, 0, 0)

@@ -29,7 +29,7 @@ from .trees import (
     kind_of,
 )
 
-for _family in ("values", "math", "color", "vector", "input", "textures", "closures", "volume"):
+for _family in ("values", "math", "color", "vector", "input", "textures", "voxels", "closures", "volume"):
     importlib.import_module(f"{__package__}.rules_{_family}")
 
 DEFAULT_GREY = 0.8  # of objects without a material

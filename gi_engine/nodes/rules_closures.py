@@ -281,6 +281,9 @@ def hair(b, weight):
 
 @closure_rule("ShaderNodeBsdfHairPrincipled")
 def principled_hair(b, weight):
+    from ..export.version import hair_on_meshes_heeds_their_sides  # needs bpy
+
+    imm = (hair_on_meshes_heeds_their_sides(),)
     along, _, is_strand, met = b.op("strand")
     random, uneven = hair_random(b), b.input("Random Roughness")
     roughness, huang = b.op("vary", b.input("Roughness"), random, uneven), b.node.model == "HUANG"
@@ -294,9 +297,9 @@ def principled_hair(b, weight):
         own_normal = NONE if round_one else b.op("attribute", imm=(b.attribute(STRAND_NORMAL),))[0]
         place = along, met, is_strand, b.op("strand_place", imm=(0,))[1], own_normal
         name = "hair_huang" if round_one else "hair_huang_elliptic"
-        b.op(name, weight, absorption, roughness, offset, ior, aspect, *parts, *place)
+        b.op(name, weight, absorption, roughness, offset, ior, aspect, *parts, *place, imm=imm)
     else:
-        b.op("hair_chiang", weight, absorption, roughness, radial, b.input("Coat"), offset, ior, along, met)
+        b.op("hair_chiang", weight, absorption, roughness, radial, b.input("Coat"), offset, ior, along, met, imm=imm)
 
 
 def hair_random(b):

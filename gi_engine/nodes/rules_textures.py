@@ -243,6 +243,7 @@ def sky(b):
 @rule("ShaderNodeTexIES")
 def ies(b):
     from ..export.texts import ies_text  # needs bpy
+    from ..export.version import ies_ends_in_darkness
 
     b.compiler.notes.lasting = False  # nobody says when a text or a file changes
 
@@ -252,4 +253,6 @@ def ies(b):
         b.warn("has no IES data that can be read and gives 100, as in Cycles")
         b.output("Fac", b.op("math_multiply", b.input("Strength"), UNREADABLE_IES))
         return
-    b.output("Fac", b.op("ies", direction, b.input("Strength"), imm=(b.table(table), len(table))))
+    b.output(
+        "Fac", b.op("ies", direction, b.input("Strength"), imm=(b.table(table), len(table), ies_ends_in_darkness()))
+    )

@@ -64,7 +64,8 @@ def scattering(b, direction):
     horizon = -(math.pi / 2 - math.asin(EARTH_RADIUS / (EARTH_RADIUS + max(n.altitude, 0.0))))
     sun = (-math.cos(elevation) * math.sin(rotation), math.cos(elevation) * math.cos(rotation), math.sin(elevation))
     reach = math.cos(min(0.5 * size + 1e-3, math.pi)) if n.sun_disc else 2.0  # a little wide: floats are coarse there
-    disc = (*bottom, *top, elevation, rotation, *sun, reach, size, n.sun_intensity, horizon)
+    alone = n.sky_type == "NISHITA"  # until Blender 4.5 the disc ends at the horizon
+    disc = (*bottom, *top, elevation, rotation, *sun, reach, size, n.sun_intensity, -1e-7 if alone else horizon, alone)
     return b.op("sky", direction, imm=(image, b.table(disc)), kind=COLOR)
 
 

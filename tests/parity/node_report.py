@@ -18,6 +18,7 @@ from pathlib import Path
 import bpy
 
 from . import node_rows, node_suite
+from .known_nodes import CYCLES_OWN
 
 ROOT = Path(__file__).resolve().parents[2]
 ROWS = ROOT / "build" / "parity_nodes.json"
@@ -111,13 +112,18 @@ def failures(kept: dict, versions: list[str]) -> list[str]:
     lines = []
     for version in versions:
         said = defaultdict(set)
-        for entry in kept[version].values():
+        for kind, entry in kept[version].items():
             for row in entry["rows"]:
                 if row["state"] == FALLBACK:
                     said[row["warnings"][0].split("): ")[-1].split("' ")[-1]].add(entry["label"])
                 elif row["state"] == DIFFERS:
                     unit = "of the pixels" if row["pixels"] else "of the blocks"
-                    lines.append(f"- {version}, {entry['label']}: {row['name']}: {100 * row['wrong']:.1f} % {unit}")
+                    reason = next(
+                        (f". {why}" for (k, part), why in CYCLES_OWN.items() if k == kind and part in row["name"]), ""
+                    )
+                    lines.append(
+                        f"- {version}, {entry['label']}: {row['name']}: {100 * row['wrong']:.1f} % {unit}{reason}"
+                    )
         lines += [f"- {version}, {', '.join(sorted(labels))}: {text}" for text, labels in sorted(said.items())]
     return lines
 

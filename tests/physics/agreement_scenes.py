@@ -157,7 +157,7 @@ def tuft(shape, fill, *lights):
 
 def fibre(b):
     along, _, _, met = b.op("strand")
-    b.op("hair_chiang", 1.0, (0.3, 0.6, 1.0), 0.3, 0.4, 0.0, 0.03, 1.55, along, met)
+    b.op("hair_chiang", 1.0, (0.3, 0.6, 1.0), 0.3, 0.4, 0.0, 0.03, 1.55, along, met, imm=(1,))
 
 
 GREY = surface(0.5)

@@ -84,6 +84,8 @@ class Bsdf {
       }
     }
   }
+  // The lobe that was added last scatters to either side of the surface, whatever its own normal.
+  void forget_last_bump() { entries_[count_ - 1].bumped = false; }
   // Called once after the last add: selection probabilities from the lobes' albedos towards `wo`.
   void finish(Vec3 wo);
 

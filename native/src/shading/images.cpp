@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/check.h"
+#include "shading/voxels.h"
 
 namespace gi {
 namespace {
@@ -135,6 +136,20 @@ const ImageTile* find_tile(const Image& image, Vec2& uv) {
 }
 
 }  // namespace
+
+Texel lookup_voxels(const Image& image, int side, Vec3 p, Interpolation interpolation) {
+  const ImageTile& t = image.tiles.front();
+  if (!t.floats || t.width != side || int64_t(t.height) != int64_t(side) * side) return {Rgb(), 0.0f};
+  const Taps x(p.x * float(side), side, interpolation, Extension::kClip), y(p.y * float(side), side, interpolation, Extension::kClip);
+  const Taps z(p.z * float(side), side, interpolation, Extension::kClip);
+  Rgba sum;
+  for (int k = 0; k < z.count; ++k) {
+    if (z.index[k] < 0) continue;
+    const float* layer = t.floats + 4 * size_t(z.index[k]) * size_t(side) * size_t(side);
+    sum += z.weight[k] * sum_of_texels(layer, t, x, y);
+  }
+  return {Rgb(sum.v[0], sum.v[1], sum.v[2]), sum.v[3]};
+}
 
 ImageSet::ImageSet(std::vector<Image> images) : images_(std::move(images)) {
   for (const Image& image : images_) {

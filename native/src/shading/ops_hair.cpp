@@ -26,6 +26,15 @@ void absorption_of_melanin(const Operands& o, ShadeState&) {
   o.set(0, Rgb(0.506f, 0.841f, 1.653f) * (amount * (1.0f - o.f(2))) + Rgb(0.343f, 0.733f, 1.924f) * (amount * o.f(2)));
 }
 
+// On meshes a lobe's own normal is far from the surface's. As in Cycles, directions that are on the surface's one side and the lobe's other
+// are then left out where light is looked for; not so up to Blender 4.5.
+template <class L>
+void add_fibre(ShadeState& s, Rgb weight, const L& lobe, Vec3 n, Vec3 tangent, bool leaves_out) {
+  const int before = s.bsdf->lobe_count();
+  add_lobe(s, weight, lobe, n, tangent);
+  if (!leaves_out && s.bsdf->lobe_count() > before) s.bsdf->forget_last_bump();
+}
+
 // weight, color, roughness along and around, offset, tangent; along and across the surface, whether it is a strand; side
 void hair_strand(const Operands& o, ShadeState& s) {
   if (!s.bsdf) return;
@@ -37,18 +46,20 @@ void hair_strand(const Operands& o, ShadeState& s) {
   add_lobe(s, o.c(1) * o.f(0), HairStrand::make(Frame::from_normal(n).to_local(tangent), o.f(2), o.f(3), offset, o.imm(9) != 0), n);
 }
 
-// weight, absorption, roughness, radial roughness, coat, offset, ior; along the fibre, where it is met
+// weight, absorption, roughness, radial roughness, coat, offset, ior; along the fibre, where it is met; as add_fibre
 void hair_chiang(const Operands& o, ShadeState& s) {
   if (!s.bsdf) return;
   const Vec3 x = normalize_or(o.v(7), Vec3{}), y = normalize_or(cross(x, s.point.wo), Vec3{});
   if (y == Vec3{}) return;
   const float met = o.f(8), h = std::abs(met) <= 1.0f ? met : dot(cross(s.point.ng, x), cross(x, y));
-  add_lobe(s, Rgb(o.f(0)), HairChiang::make(positive(o.c(1)), o.f(2), o.f(3), o.f(4), o.f(5), std::max(o.f(6), 1e-3f), h), y, x);
+  const HairChiang lobe = HairChiang::make(positive(o.c(1)), o.f(2), o.f(3), o.f(4), o.f(5), std::max(o.f(6), 1e-3f), h);
+  add_fibre(s, Rgb(o.f(0)), lobe, y, x, o.imm(9) != 0);
 }
 
 // weight, absorption, roughness, offset, ior, aspect, R, TT, TRT; along the fibre, where a ribbon is met, whether it is a strand, its
-// diameter (metres); its own normal, along which the long axis lies, taken for the world's as in Cycles. Rays that pass an elliptic fibre,
-// which is traced as a round one, go on. Where the camera sees the fibre wider than a pixel, it sees the pixel's part of the width alone.
+// diameter (metres); its own normal, along which the long axis lies, taken for the world's as in Cycles; as add_fibre. Rays that pass an
+// elliptic fibre, which is traced as a round one, go on. Where the camera sees the fibre wider than a pixel, it sees the pixel's part of
+// the width alone.
 void hair_huang(const Operands& o, ShadeState& s) {
   if (!s.bsdf || (o.f(6) <= 0.0f && o.f(7) <= 0.0f && o.f(8) <= 0.0f)) return;
   const Vec3 y = normalize(o.v(9)), across = normalize(cross(y, s.point.wo));
@@ -65,7 +76,7 @@ void hair_huang(const Operands& o, ShadeState& s) {
   }
   const float pixel = s.point.footprint / (0.5f * o.f(12));  // over the fibre's radius
   if (strand && (s.point.path.kind & kRayCamera) && pixel > 0.0f && wide > pixel) lobe.h_from = h - pixel, lobe.h_to = h + pixel;
-  add_lobe(s, Rgb(o.f(0)), lobe, x, y);
+  add_fibre(s, Rgb(o.f(0)), lobe, x, y, o.imm(14) != 0);
 }
 
 const Op kOps[] = {
@@ -73,9 +84,9 @@ const Op kOps[] = {
     {"absorption_of_color", "v", "vf", 0, OpKind::kPure, absorption_of_color},
     {"absorption_of_melanin", "v", "ff", 0, OpKind::kPure, absorption_of_melanin},
     {"hair_strand", "", "fvfffvvvf", 1, OpKind::kClosure, hair_strand, kAddsLobe},
-    {"hair_chiang", "", "fvfffffvf", 0, OpKind::kClosure, hair_chiang, kAddsLobe},
-    {"hair_huang", "", "fvfffffffvfffv", 0, OpKind::kClosure, hair_huang, kAddsLobe},
-    {"hair_huang_elliptic", "", "fvfffffffvfffv", 0, OpKind::kClosure, hair_huang, kAddsLobe | kAddsTransparency | kSeesPoint},
+    {"hair_chiang", "", "fvfffffvf", 1, OpKind::kClosure, hair_chiang, kAddsLobe},
+    {"hair_huang", "", "fvfffffffvfffv", 1, OpKind::kClosure, hair_huang, kAddsLobe},
+    {"hair_huang_elliptic", "", "fvfffffffvfffv", 1, OpKind::kClosure, hair_huang, kAddsLobe | kAddsTransparency | kSeesPoint},
 };
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "shading/textures/sky.h"
 #include "shading/textures/voronoi.h"
 #include "shading/textures/wave.h"
+#include "shading/voxels.h"
 
 namespace gi {
 namespace {
@@ -139,6 +140,14 @@ void image_box_texture(const Operands& a, ShadeState& s) {
   set_texel(a, sum);
 }
 
+// voxels(colour, density; place in the unit cube; image, its side, Interpolation)
+void voxels(const Operands& a, ShadeState& s) {
+  const ImageSet* images = s.resources.images.get();
+  const bool known = images && a.imm(3) >= 0 && size_t(a.imm(3)) < images->size();
+  const Texel nothing{Rgb(), 0.0f};
+  set_texel(a, known ? lookup_voxels((*images)[size_t(a.imm(3))], a.imm(4), a.v(2), Interpolation(a.imm(5))) : nothing);
+}
+
 // environment(colour, alpha; direction; image, EnvironmentProjection, Interpolation)
 void environment_texture(const Operands& a, ShadeState& s) {
   const bool ball = EnvironmentProjection(a.imm(4)) == EnvironmentProjection::kMirrorBall;
@@ -166,8 +175,7 @@ void sky_texture(const Operands& a, ShadeState& s) {
   const Vec3 d = a.v(1);  // not made unit
   const SkyDisc disc = from_table<SkyDisc>(s, a.imm(3));
   const Rgb sky = lookup(s, a.imm(2), sky_coordinates(d, disc.rotation), Interpolation::kLinear, Extension::kExtend, false).color;
-  const Rgb sum = sky + sun_disc(d, disc);
-  a.set(0, positive(sum));
+  a.set(0, positive(with_sun_disc(sky, d, disc)));
 }
 
 // sky_preetham(colour; direction; offset of a PreethamSky)
@@ -180,11 +188,11 @@ void hosek_wilkie_texture(const Operands& a, ShadeState& s) {
   a.set(0, hosek_wilkie(texture::by_angles(a.v(1)), from_table<SunnyHosekWilkieSky>(s, a.imm(2))));
 }
 
-// ies(factor; direction, strength; offset of an IesTable, its size)
+// ies(factor; direction, strength; offset of an IesTable, its size, whether it is followed by darkness)
 void ies_texture(const Operands& a, ShadeState& s) {
   const Vec3 d = normalize(a.v(1));
   const float h = std::atan2(d.x, d.y) + kPi, v = std::acos(std::clamp(-d.z, -1.0f, 1.0f));
-  a.set(0, a.f(2) * IesTable(s.tables + a.imm(3)).at(h, v));
+  a.set(0, a.f(2) * IesTable(s.tables + a.imm(3), a.imm(5) != 0).at(h, v));
 }
 bool ies_fits(const int32_t* immediates, size_t tables) {
   return immediates[0] >= 0 && immediates[1] >= 6 && int64_t(immediates[0]) + immediates[1] <= int64_t(tables);
@@ -203,11 +211,12 @@ constexpr Op kTextureOps[] = {
     {"magic", "vf", "vff", 1, OpKind::kPure, magic_texture},
     {"image", "vf", "v", 5, OpKind::kContext, image_texture},
     {"image_box", "vf", "vfv", 4, OpKind::kContext, image_box_texture},
+    {"voxels", "vf", "v", 3, OpKind::kContext, voxels},
     {"environment", "vf", "v", 3, OpKind::kContext, environment_texture},
     {"sky", "v", "v", 2, OpKind::kContext, sky_texture, 0, table_has<SkyDisc, 1>},
     {"sky_preetham", "v", "v", 1, OpKind::kContext, preetham_texture, 0, table_has<PreethamSky, 0>},
     {"sky_hosek_wilkie", "v", "v", 1, OpKind::kContext, hosek_wilkie_texture, 0, table_has<SunnyHosekWilkieSky, 0>},
-    {"ies", "f", "vf", 2, OpKind::kPure, ies_texture, 0, ies_fits},
+    {"ies", "f", "vf", 3, OpKind::kPure, ies_texture, 0, ies_fits},
 };
 
 }  // namespace

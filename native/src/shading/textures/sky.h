@@ -14,6 +14,7 @@ struct SkyDisc {
   float diameter;              // angle
   float intensity;
   float horizon;               // elevation of the earth's edge: below it no sun
+  float alone;  // 1, up to Blender 4.5: nothing of the sky before it, and what is above the horizon has all of its colours
 };
 
 inline float angle_between(Vec3 a, Vec3 b) { return 2.0f * std::atan2(length(a - b), length(a + b)); }  // precise where small
@@ -32,17 +33,20 @@ inline Vec2 sky_coordinates(Vec3 d, float rotation) {
   return {turns - std::floor(turns), sky_row(sky_elevation(d))};
 }
 
-inline Rgb sun_disc(Vec3 d, const SkyDisc& s) {
-  if (dot(d, s.sun) < s.cos_reach * std::min(1.0f, length(d))) return Rgb();
+inline Rgb with_sun_disc(Rgb sky, Vec3 d, const SkyDisc& s) {
+  if (dot(d, s.sun) < s.cos_reach * std::min(1.0f, length(d))) return sky;
   const float angle = angle_between(d, s.sun), half = 0.5f * s.diameter, elevation = sky_elevation(d);
-  if (!(angle < half) || elevation <= s.horizon) return Rgb();
+  if (!(angle < half) || elevation <= s.horizon) return sky;
   const float darkening = 1.0f - 0.6f * (1.0f - safe_sqrt(1.0f - sqr(angle / half)));  // of the limb
-  return lerp(Rgb(s.bottom), Rgb(s.top), (elevation - s.elevation) / s.diameter + 0.5f) * (s.intensity * darkening);
+  const bool squeezed = s.alone != 0.0f && s.elevation <= half;
+  const float up = squeezed ? elevation / (s.elevation + half) : (elevation - s.elevation) / s.diameter + 0.5f;
+  const Rgb disc = lerp(Rgb(s.bottom), Rgb(s.top), up) * (s.intensity * darkening);
+  return s.alone != 0.0f ? disc : sky + disc;
 }
 
 // [Preetham et al. 1999, "A practical analytic model for daylight"]
 struct PreethamChannel {
-  float zenith;     // value at the zenith over its Perez function there
+  float zenith;  // value at the zenith over its Perez function there
   float perez[5];
 };
 struct PreethamSky {
