@@ -28,6 +28,8 @@ PNG_MAGIC, PNG_DEPTH_AT = b"\x89PNG", 24
 HEAD_BYTES = 64  # enough to tell the format
 TILE_TOKENS = ("<UDIM>", "<UVTILE>")
 
+# Files that could not be read, as they were then. Trying again makes datablocks, of which Blender tells the viewport, which reads again …
+_hopeless: dict[str, tuple] = {}
 _scratch = np.empty(0, np.float32)  # reused from image to image: paging in a fresh one takes longer than the copy
 
 
@@ -67,6 +69,8 @@ def read_frame(image, warn, user) -> list[Image]:
 def read_movie(image, frame: int, warn, path: str) -> Image:
     """Scripts see the frame that was last looked at, whoever did: here a texture does."""
     stays = image.has_data
+    if not stays and is_hopeless(path):
+        return shown_missing(image, image.name, warn, path)
     try:
         texture = bpy.data.textures.new("frame of a movie", "IMAGE")
     except (RuntimeError, AttributeError):  # where Blender lets nothing be made
@@ -99,6 +103,8 @@ def read_file(like, path: str, packed: bytes | None, warn) -> Image:
     pixels = bytes_of_file(path, packed)
     if pixels is not None:
         return from_file_bytes(like, pixels)
+    if packed is None and is_hopeless(path):
+        return shown_missing(None, like.name, warn, path)
     with temporary_image(like, path, packed) as image:
         return read_datablock(image, like.name, warn, path)
 
@@ -107,8 +113,7 @@ def read_datablock(image, name: str, warn, path: str) -> Image:
     """What Blender has loaded, or loads now and lets go of again. `image` may be None."""
     stays = image is None or image.has_data
     if image is None or not load(image):
-        warn(f"image '{name}' shows magenta: {trouble(image, path)}")
-        return missing(name)
+        return shown_missing(image, name, warn, path)
     if image.is_float:
         found = from_floats(image, name)
     else:
@@ -166,6 +171,27 @@ def stays_encoded(space: str) -> bool:
 def load(image) -> bool:
     """Whether the image has pixels; reads the file if need be."""
     return image.size[0] > 0 and image.size[1] > 0 and len(image.pixels) >= image.size[0] * image.size[1]
+
+
+def shown_missing(image, name: str, warn, path: str) -> Image:
+    warn(f"image '{name}' shows magenta: {trouble(image, path)}")
+    _hopeless[path] = stamp(path)
+    return missing(name)
+
+
+def is_hopeless(path: str) -> bool:
+    """Whether there is no such file, or it is still the one that could not be read."""
+    now = stamp(path)
+    return not now or _hopeless.get(path) == now
+
+
+def stamp(path: str) -> tuple:
+    """By which a file is known again; empty where there is none."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return ()
+    return found.st_mtime_ns, found.st_size
 
 
 def trouble(image, path: str) -> str:

@@ -245,6 +245,52 @@ def test_frames_of_a_movie_are_cycles(key, tmp_path):
     assert np.ptp(reds) > 0.1 or key == "of one frame"
 
 
+@pytest.mark.parametrize("how", ["missing", "damaged"])
+@pytest.mark.parametrize("source", ["MOVIE", "SEQUENCE"])
+def test_what_cannot_be_read_does_not_keep_the_viewport_reading(source, how, tmp_path):
+    """A datablock that is made, even for a moment, makes Blender tell the viewport of a change, which then reads all again."""
+    path = write_movie(tmp_path) if source == "MOVIE" else write_png(tmp_path / "f_1.png")
+    image = bpy.data.images.load(str(path))
+    image.source = source
+    user = user_of(image)
+    if how == "missing":
+        path.unlink()
+    else:
+        path.write_bytes(b"no picture at all" * 40)
+    changes = []
+
+    def notice(*_):
+        changes.append(1)
+
+    bpy.app.handlers.depsgraph_update_post.append(notice)
+    read(image, user)
+    bpy.context.view_layer.update()
+    changes.clear()
+    tile, warnings = read(image, user)
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.remove(notice)
+    assert len(warnings) == 1 and tuple(tile.pixels[0, 0]) == (255, 0, 255, 255)
+    assert not changes
+    # A file that is put there again is read.
+    if source == "SEQUENCE":
+        write_png(path)
+        tile, warnings = read(image, user)
+        assert not warnings and tuple(tile.pixels[0, 0]) == SRGB_ORANGE
+
+
+def user_of(image):
+    """How a node shows the image: from the scene's first frame on."""
+    material = bpy.data.materials.get("user")
+    if material is None:
+        material = bpy.data.materials.new("user")
+        if material.node_tree is None:
+            material.use_nodes = True
+        material.node_tree.nodes.new("ShaderNodeTexImage").name = "shows"
+    node = material.node_tree.nodes["shows"]
+    node.image, node.image_user.frame_duration = image, 10
+    return node.image_user
+
+
 def srgb_to_linear(encoded):
     return np.where(encoded < 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
