@@ -4,7 +4,6 @@ KNOWN: dict[str, str] = {}
 # In one of Blender's versions, or by a pixel more or less than is allowed.
 SOMETIMES: dict[str, str] = {
     "ShaderNodeTexVoronoi": "powers of Minkowski's metric are rounded differently",
-    "ShaderNodeWireframe": "how wide a pixel is differs a little",
 }
 # Rows (a part of their name) in which Cycles does not agree with itself.
 CYCLES_OWN: dict[tuple[str, str], str] = {

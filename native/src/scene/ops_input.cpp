@@ -28,10 +28,11 @@ void reflection(const Operands& o, ShadeState& s) {
   o.set(0, p.instance == kNoId ? p.wo : reflect(p.wo, p.ns));
 }
 
-// Width of a pixel along the surface's first direction, as it is seen.
+// Width of a pixel on the surface as it is seen: the mean along two directions, which are Cycles', for it hangs on them.
 float pixel_across(const ShadingPoint& p) {
-  const Vec3 dx = Frame::from_normal(p.ng).x * (2.0f * p.footprint);
-  return length(dx - p.wo * dot(dx, p.wo));
+  const Vec3 x = normalize_or(cross(Vec3{1, 1, 1}, p.ng), Frame::from_normal(p.ng).x), y = cross(p.ng, x);
+  const auto seen = [&](Vec3 d) { return length(d - p.wo * dot(d, p.wo)); };
+  return p.footprint * (seen(x) + seen(y));
 }
 
 // size; in pixels
