@@ -29,6 +29,25 @@ Table make_table(size_t rows, size_t columns, float** data) {
   return Table(*data, {rows, columns}, owner);
 }
 
+// Directions of a guide that rays from `seen` have met light along: x, y, z and weight for each row of `random` (cell, and two within it).
+Table guided_directions(Rows seen, Numbers light, Rows random) {
+  IrradianceGuide guide;
+  for (size_t i = 0; i < seen.shape(0); ++i) {
+    const Sighting s(row_of(seen, i), 1.0f, light(i));
+    guide.add(s.local(), s.luminance());
+  }
+  guide.settle();
+  float* data;
+  Table out = make_table(random.shape(0), 4, &data);
+  for (size_t i = 0; i < random.shape(0); ++i) {
+    const Vec3 u = row_of(random, i);
+    const IrradianceGuide::Direction d = guide.sample(u.x, {u.y, u.z});
+    const float row[4] = {d.local.x, d.local.y, d.local.z, d.weight};
+    std::copy(row, row + 4, data + 4 * i);
+  }
+  return out;
+}
+
 class TestIrradiance {
  public:
   TestIrradiance(nb::handle data, const std::string& embree, float error) : cache_({}, error) {
@@ -129,6 +148,7 @@ class TestIrradiance {
 }  // namespace
 
 void bind_irradiance(nb::module_& m) {
+  m.def("guided_directions", &guided_directions, nb::arg("seen"), nb::arg("light"), nb::arg("random"));
   nb::class_<TestIrradiance>(m, "TestIrradiance")
       .def(nb::init<nb::handle, const std::string&, float>(), nb::arg("scene"), nb::arg("embree"), nb::arg("error"))
       .def("gather", &TestIrradiance::gather, nb::arg("position"), nb::arg("normal"), nb::arg("samples"), nb::arg("seed") = 1)

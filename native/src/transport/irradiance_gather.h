@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "transport/irradiance_cache.h"
+#include "transport/irradiance_guide.h"
 
 namespace gi {
 
@@ -27,11 +28,17 @@ struct GatheredIrradiance {
   IrradianceRecord record;  // its radius is the harmonic mean
   float nearest = kInf;  // metres; no wall is nearer
   float wall = kInf;     // metres, to what is no mere chair's leg: a tenth of the rays meet something nearer
+  Around around{};       // metres, to what a quarter of the rays that way do not get past
   float variance = 0;    // of the irradiance's luminance, (W/m²)²: by differences of neighbouring strata, rather too much
+  std::vector<Sighting> seen;  // by each ray
 };
 
 // `ray(index, direction)`: about `samples` of them, one for each stratum; `jitter(index)` places it therein.
 GatheredIrradiance gather_irradiance(Vec3 position, Vec3 normal, int samples, const std::function<Vec2(int)>& jitter,
                                      const std::function<GatheredRay(int, Vec3)>& ray);
+
+// The same from rays that a guide sends, without gradients of moves or distances. `jitter(index)`: three numbers.
+GatheredIrradiance gather_guided(Vec3 normal, int samples, const IrradianceGuide& guide, const std::function<Vec3(int)>& jitter,
+                                 const std::function<GatheredRay(int, Vec3)>& ray);
 
 }  // namespace gi

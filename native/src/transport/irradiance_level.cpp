@@ -8,6 +8,8 @@ namespace {
 
 constexpr float kLeastReach = 0.5f;  // pixels
 constexpr int kBatch = 256;
+constexpr size_t kGuides = 16;    // records whose rays guide those of one
+constexpr float kTurned = 0.7f;   // cosine between their normals
 
 // Calls f(a's, b's) for each colour that gathering finds.
 template <class F>
@@ -48,17 +50,54 @@ void IrradianceLevel::insert(const IrradiancePlace& place, const GatheredIrradia
   const IrradianceRecord record = settled(place, gathered);
   cache_.insert(record);
   growth_.push_back({place});
-  gathered_.push_back({record, gathered.variance, gathered.wall});
+  gathered_.push_back({record, gathered.variance, gathered.around, gathered.wall});
+  sightings_.insert(sightings_.end(), gathered.seen.begin(), gathered.seen.end());
+  sighted_.push_back(sightings_.size());
 }
 
-void IrradianceLevel::improve(size_t index, const GatheredIrradiance& gathered) {
-  IrradianceRecord more = gathered.record;
-  temper(more, cache_.records()[index].radius);
-  auto& [light, variance, wall] = gathered_[index];
-  const float share = 1.0f / ++growth_[index].gathers;
-  for_each_colour(light, more, [&](Rgb& mean, Rgb value) { mean += (value - mean) * share; });
-  variance = variance * sqr(1.0f - share) + gathered.variance * sqr(share);
-  ++improved_;
+void IrradianceLevel::improve(size_t index, const GatheredIrradiance& guided, float worth) {
+  auto& [light, variance, around, wall] = gathered_[index];
+  growth_[index].gathers += worth;
+  const float share = worth / growth_[index].gathers;
+  const IrradianceRecord& more = guided.record;
+  light.irradiance += (more.irradiance - light.irradiance) * share;
+  for (int axis = 0; axis < 3; ++axis) light.lateral[axis] += (more.lateral[axis] - light.lateral[axis]) * share;
+  variance = variance * sqr(1.0f - share) + guided.variance * sqr(share);
+  improved_ += worth;
+}
+
+void IrradianceLevel::learn(ThreadPool& pool) {
+  if (tree_.size() == size()) return;
+  std::vector<Vec3> positions;
+  for (const IrradianceRecord& r : cache_.records()) positions.push_back(r.position);
+  tree_ = PointTree(positions, pool);
+}
+
+IrradianceGuide IrradianceLevel::guide(size_t record) const {
+  const IrradianceRecord& own = cache_.records()[record];
+  const Frame frame = Frame::from_normal(own.normal);
+  IrradianceGuide guide;
+  std::vector<PointTree::Found> near;
+  tree_.nearest(own.position, kGuides, kInf, near,
+                [&](uint32_t k) { return dot(cache_.records()[tree_.order()[k]].normal, own.normal) > kTurned; });
+  // In an order of its own: sums must not depend on that of the search.
+  std::vector<uint32_t> guides;
+  for (const PointTree::Found& f : near) guides.push_back(tree_.order()[f.point]);
+  std::sort(guides.begin(), guides.end());
+  for (const uint32_t other : guides) {
+    const IrradianceRecord& r = cache_.records()[other];
+    const Frame theirs = Frame::from_normal(r.normal);
+    const Vec3 x = frame.to_local(theirs.x), y = frame.to_local(theirs.y), z = frame.to_local(theirs.z);
+    const Vec3 apart = frame.to_local(r.position - own.position);
+    for (size_t i = sighted_[other]; i < sighted_[other + 1]; ++i) {
+      const Sighting& s = sightings_[i];
+      const Vec3 way = s.local(), there = way.x * x + way.y * y + way.z * z;
+      const Vec3 local = std::isfinite(s.distance()) ? normalize(there * s.distance() + apart) : there;
+      if (local.z > 0.0f) guide.add(local, s.luminance());
+    }
+  }
+  guide.settle();
+  return guide;
 }
 
 void IrradianceLevel::smooth(ThreadPool& pool, const std::atomic<bool>& cancelled, int pass, size_t first) {
@@ -127,7 +166,8 @@ void IrradianceLevel::take_over(const std::vector<float>& rows, bool fixed) {
     const float* more = &rows[begin + IrradianceRecord::kNumbers];
     cache_.insert(r);
     growth_.push_back({{r.position, {more[0], more[1], more[2]}, r.normal, more[3], more[4]}, more[5], fixed});
-    gathered_.push_back({r, more[6], more[7]});
+    gathered_.push_back({r, more[6], {}, more[7]});
+    sighted_.push_back(sightings_.size());
   }
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 #include <string>
 
+#include "core/point_tree.h"
 #include "transport/irradiance_gather.h"
 #include "transport/irradiance_smoothing.h"
 
@@ -35,8 +36,11 @@ class IrradianceLevel {
   bool is_fixed(size_t record) const { return growth_[record].fixed; }
 
   void insert(const IrradiancePlace& place, const GatheredIrradiance& gathered);
-  // As many rays once more for one record. No lookup knows before the next `smooth`.
-  void improve(size_t record, const GatheredIrradiance& gathered);
+  // More rays for one record, worth so many times its first ones. No lookup knows before the next `smooth`.
+  void improve(size_t record, const GatheredIrradiance& guided, float worth);
+  // Where more rays of a record should go, by what first rays of those near by have met; of the records of the last `learn`.
+  void learn(ThreadPool& pool);
+  IrradianceGuide guide(size_t record) const;
   void freeze() { cache_.freeze(); }
   // From now on lookups find the light that was gathered, evened out, of all records from `first` on. `pass`: the first to see it.
   void smooth(ThreadPool& pool, const std::atomic<bool>& cancelled, int pass, size_t first = 0);
@@ -69,6 +73,9 @@ class IrradianceLevel {
   std::vector<Growth> growth_;
   std::vector<IrradianceSmoothing::Gathered> gathered_;
   IrradianceSmoothing smoothing_;
+  std::vector<Sighting> sightings_;    // of all records' first rays
+  std::vector<size_t> sighted_{0};     // where those of each begin
+  PointTree tree_;
   double improved_ = 0;  // gathers since the last smoothing
 };
 

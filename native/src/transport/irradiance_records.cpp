@@ -1,4 +1,4 @@
-// IrradianceRecords: overture, waves, refinement.
+// IrradianceRecords: overture, waves, guided rays, refinement.
 #include "transport/irradiance_records.h"
 
 #include "core/check.h"
@@ -125,6 +125,7 @@ void IrradianceRecords::play_overture(const Work& work) {
     level_ends_ = seconds + (level > 0 ? kDeeperShare : 1.0) * left;
     const size_t taken = levels_[size_t(level)].size();  // evened out before they were kept
     fill_level(work, level);
+    sharpen(work, level, taken);
     levels_[size_t(level)].freeze();
     levels_[size_t(level)].smooth(context.pool, context.cancelled, 0, taken);
   }
@@ -165,6 +166,7 @@ void IrradianceRecords::fill_gaps(const Work& work, int pass, double most_rays) 
     const size_t before = levels_[size_t(level)].size();
     fill_seen(work, level, level == 0 ? kFinest : kSeedStep, pass);
     if (levels_[size_t(level)].size() == before) continue;
+    sharpen(work, level, before);
     levels_[size_t(level)].freeze();
     levels_[size_t(level)].smooth(context.pool, context.cancelled, pass);
   }
@@ -304,6 +306,8 @@ void IrradianceRecords::refine(const Work& work, int pass) {
   const double to_expect = passes_to_expect(context, pass), wanted = rays_to_refine(pass, std::min<double>(kAhead * pass, to_expect));
   fill_gaps(work, pass, 0.5 * rays_to_refine(pass, to_expect));
   const size_t all = size();
+  if (wanted > 0.0)
+    for (IrradianceLevel& level : levels_) level.learn(context.pool);
   const auto spent = [&] { return double(context.scene.rays_traced() - start); };
   for (size_t idle = 0; idle < all && spent() < wanted;) {
     std::vector<Chosen> chosen;
@@ -319,32 +323,67 @@ void IrradianceRecords::refine(const Work& work, int pass) {
     std::vector<GatheredIrradiance> made(chosen.size());
     context.pool.for_each(int(chosen.size()), context.cancelled, [&](int i) {
       const Chosen& c = chosen[size_t(i)];
-      made[size_t(i)] = gather(work, levels_[size_t(c.level)].place(c.record), c.level, gathered_ + uint32_t(i));
+      made[size_t(i)] = gather_guided_by_others(work, c.level, c.record, gathered_ + uint32_t(i));
     });
     if (context.cancelled) return;
     gathered_ += uint32_t(chosen.size());
-    for (size_t i = 0; i < chosen.size(); ++i) levels_[size_t(chosen[i].level)].improve(chosen[i].record, made[i]);
+    for (size_t i = 0; i < chosen.size(); ++i)
+      levels_[size_t(chosen[i].level)].improve(chosen[i].record, made[i], worth_at(chosen[i].level));
   }
   for (IrradianceLevel& level : levels_)
     if (level.is_worth_smoothing()) level.smooth(context.pool, context.cancelled, pass);
   refining_rays_ += spent();
 }
 
+GatheredRay IrradianceRecords::follow(const Work& work, const IrradiancePlace& place, int level, Vec3 direction, Sampler& sampler) const {
+  if (dot(direction, place.ng) <= 0.0f || work.context.cancelled) return {};
+  const CameraRay from{{offset_point(place.position, place.ng, direction), direction}, place.spread, place.footprint};
+  PathState path;
+  path.depth = path.diffuse_depth = int16_t(level);
+  advance(path, kReflection | kDiffuse, s_.limits);
+  GatheredRay seen = work.follow(from, path, sampler);
+  if (!is_finite(seen.radiance)) seen.radiance = Rgb();
+  return seen;
+}
+
 GatheredIrradiance IrradianceRecords::gather(const Work& work, const IrradiancePlace& place, int level, uint32_t serial) const {
   const uint32_t seed = hash_combine(work.context.seed, kGatherSalt);
   return gather_irradiance(
-      place.position, place.normal, samples_at(level), [&](int i) { return Sampler(seed, serial, uint32_t(i)).next_2d(); },
-      [&](int i, Vec3 direction) -> GatheredRay {
-        if (dot(direction, place.ng) <= 0.0f || work.context.cancelled) return {};
-        const CameraRay from{{offset_point(place.position, place.ng, direction), direction}, place.spread, place.footprint};
-        PathState path;
-        path.depth = path.diffuse_depth = int16_t(level);
-        advance(path, kReflection | kDiffuse, s_.limits);
+      place.position, place.normal, first_samples_at(level), [&](int i) { return Sampler(seed, serial, uint32_t(i)).next_2d(); },
+      [&](int i, Vec3 direction) {
         Sampler sampler(seed, serial, uint32_t(i));
-        GatheredRay seen = work.follow(from, path, sampler);
-        if (!is_finite(seen.radiance)) seen.radiance = Rgb();
-        return seen;
+        return follow(work, place, level, direction, sampler);
       });
+}
+
+GatheredIrradiance IrradianceRecords::gather_guided_by_others(const Work& work, int level, size_t record, uint32_t serial) const {
+  const uint32_t seed = hash_combine(work.context.seed, kGatherSalt);
+  const IrradiancePlace& place = levels_[size_t(level)].place(record);
+  std::vector<Sampler> samplers;
+  for (int i = 0; i < guided_samples_at(level); ++i) samplers.emplace_back(seed, serial, uint32_t(i));
+  return gather_guided(
+      place.normal, guided_samples_at(level), levels_[size_t(level)].guide(record),
+      [&](int i) {
+        const Vec2 within = samplers[size_t(i)].next_2d();
+        return Vec3{within.x, within.y, samplers[size_t(i)].next_2d().x};
+      },
+      [&](int i, Vec3 direction) { return follow(work, place, level, direction, samplers[size_t(i)]); });
+}
+
+// A round of guided rays for all records of a level from `first` on.
+void IrradianceRecords::sharpen(const Work& work, int level, size_t first) {
+  const RenderContext& context = work.context;
+  IrradianceLevel& records = levels_[size_t(level)];
+  records.learn(context.pool);
+  for (size_t begin = first; begin < records.size() && !context.cancelled && !is_late(context); begin += kRefined) {
+    std::vector<GatheredIrradiance> made(std::min(kRefined, records.size() - begin));
+    context.pool.for_each(int(made.size()), context.cancelled, [&](int i) {
+      made[size_t(i)] = gather_guided_by_others(work, level, begin + size_t(i), gathered_ + uint32_t(i));
+    });
+    if (context.cancelled) return;
+    gathered_ += uint32_t(made.size());
+    for (size_t i = 0; i < made.size(); ++i) records.improve(begin + i, made[i], worth_at(level));
+  }
 }
 
 }  // namespace gi

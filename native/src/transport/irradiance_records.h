@@ -58,6 +58,7 @@ class IrradianceRecords {
     const Film& film;
     const Follow& follow;
   };
+  static constexpr float kWorth = 3.0f;  // first rays that a guided one is worth, about: no record's own noise may decide it
   std::optional<Rgb> look_up(const ShadingPoint& point, const Bsdf& bsdf, int level, PixelSample& result) const;
   void play_overture(const Work& work);
   void fill_level(const Work& work, int level);
@@ -68,7 +69,10 @@ class IrradianceRecords {
   double passes_to_expect(const RenderContext& context, int pass) const;
   double rays_to_refine(int pass, double passes) const;
   void refine(const Work& work, int pass);
+  void sharpen(const Work& work, int level, size_t first);
   GatheredIrradiance gather(const Work& work, const IrradiancePlace& place, int level, uint32_t serial) const;
+  GatheredIrradiance gather_guided_by_others(const Work& work, int level, size_t record, uint32_t serial) const;
+  GatheredRay follow(const Work& work, const IrradiancePlace& place, int level, Vec3 direction, Sampler& sampler) const;
   bool is_late(const RenderContext& context) const { return context.time_limit > 0.0 && context.seconds() > level_ends_; }
 
   double miss_rate() const {
@@ -79,6 +83,10 @@ class IrradianceRecords {
   // Deeper records are seen through shallower ones: they may be coarser.
   float error_at(int level) const { return level == 0 ? s_.error : std::min(2.0f * s_.error, 0.6f); }
   int samples_at(int level) const { return level == 0 ? s_.samples : std::max(s_.samples / 3, 32); }
+  // Of those, the ones that know of nothing yet, and those that they guide, also when the record is refined.
+  int first_samples_at(int level) const { return std::max(samples_at(level) * 3 / 8, 24); }
+  int guided_samples_at(int level) const { return std::max(samples_at(level) - first_samples_at(level), 16); }
+  float worth_at(int level) const { return kWorth * float(guided_samples_at(level)) / float(first_samples_at(level)); }
 
   IrradianceRecordsSettings s_;
   std::vector<IrradianceLevel> levels_;

@@ -8,13 +8,25 @@
 namespace gi {
 namespace {
 
-constexpr size_t kSteps[] = {1, 4, 12, 36};  // records of the means that are tried
+constexpr size_t kSteps[] = {1, 2, 4, 8, 16, 36};  // records of the means that are tried
 constexpr size_t kJudges = 12;               // records whose mean variance is taken for that of each
 constexpr float kAlone = 2.0f;               // times as far off a record alone may be: its noise has a long tail
 constexpr float kSameSide = 0.9f;            // cosine between normals
 constexpr float kOfWall = 1.0f / 3.0f;       // of the distance to walls: how far records may lie apart
+constexpr float kAlike = 1.5f;               // between distances that may well be the same: few rays know them
+constexpr float kFar = 12.0f;                // times as far as a record holds: farther ones are no neighbours
 constexpr float kFlat = 0.15f;               // of the distance: how far from the tangent plane
 constexpr int kBatch = 256;
+
+// Whether nothing that either sees comes nearer or goes away between them, as along a wall: in every eighth of a turn things are either
+// far off or as far from one as from the other.
+bool are_alike(const Around& a, const Around& b, float distance) {
+  for (size_t k = 0; k < a.size(); ++k) {
+    const float nearer = std::min(a[k], b[k]), farther = std::max(a[k], b[k]);
+    if (distance > kOfWall * nearer && !(farther <= kAlike * nearer)) return false;
+  }
+  return true;
+}
 
 bool are_of_one_surface(const IrradianceRecord& a, const IrradianceRecord& b, float reach) {
   const Vec3 d = b.position - a.position;
@@ -35,6 +47,13 @@ IrradianceSmoothing::IrradianceSmoothing(const IrradianceCache& cache, const std
   const float overlap = IrradianceCache::kOverlap * cache.error();
   // Metres: things nearer than that hide no more than a little of what is seen.
   const auto clear_of_walls = [&](size_t k) { return std::max(records[k].reach, kOfWall * gathered[k].wall); };
+  // Metres within which others may be alike.
+  std::vector<float> open(records.size());
+  for (size_t k = 0; k < records.size(); ++k) {
+    Around around = gathered[k].around;
+    std::sort(around.begin(), around.end());
+    open[k] = std::min(around[around.size() / 2], kFar * records[k].radius * overlap);
+  }
   std::vector<std::vector<uint32_t>> found(records.size());
   pool.for_each(int((records.size() + kBatch - 1) / kBatch), cancelled, [&](int batch) {
     std::vector<PointTree::Found> near;
@@ -43,9 +62,11 @@ IrradianceSmoothing::IrradianceSmoothing(const IrradianceCache& cache, const std
       const auto accepts = [&](uint32_t k) {
         const uint32_t other = tree.order()[k];
         const float seen = std::min(clear_of_walls(i), clear_of_walls(other)), held = overlap * std::min(own.radius, records[other].radius);
-        return are_of_one_surface(own, records[other], std::max(seen, held));
+        if (are_of_one_surface(own, records[other], std::max(seen, held))) return true;
+        return are_of_one_surface(own, records[other], std::min(open[i], open[other])) &&
+               are_alike(gathered[i].around, gathered[other].around, length(own.position - records[other].position));
       };
-      const float farthest = 1.001f * std::max(clear_of_walls(i), overlap * own.radius);
+      const float farthest = 1.001f * std::max({clear_of_walls(i), overlap * own.radius, open[i]});
       tree.nearest(own.position, std::end(kSteps)[-1], sqr(farthest), near, accepts);
       for (PointTree::Found& f : near) f.point = tree.order()[f.point];
       std::sort(near.begin(), near.end(), [&](const auto& a, const auto& b) {

@@ -3,6 +3,7 @@
 #pragma once
 #include "core/parallel.h"
 #include "transport/irradiance_cache.h"
+#include "transport/irradiance_guide.h"
 
 namespace gi {
 
@@ -12,11 +13,13 @@ class IrradianceSmoothing {
   struct Gathered {
     IrradianceRecord light;
     float variance = 0;  // of the irradiance's luminance, (W/m²)²
+    Around around{};     // metres, to what lies each way; 0: not known
     float wall = kInf;   // metres, to what takes up some part of its view
   };
 
   IrradianceSmoothing() = default;
-  // Finds the neighbours of all records from `first` on: on the same surface, and nearer than walls that either of them sees.
+  // Finds the neighbours of all records from `first` on: on the same surface, and nearer than walls that either of them sees, or
+  // where both see the same all around.
   IrradianceSmoothing(const IrradianceCache& cache, const std::vector<Gathered>& gathered, size_t first, ThreadPool& pool,
                       const std::atomic<bool>& cancelled);
 
