@@ -3,7 +3,7 @@
 KNOWN: dict[str, str] = {}
 # In one of Blender's versions, or by a pixel more or less than is allowed.
 SOMETIMES: dict[str, str] = {
-    "ShaderNodeWireframe": "in pixels a wire is one or two in a hundred narrower than Cycles', and may end on the other side of a ray",
+    "ShaderNodeWireframe": "where wires in pixels end is a jump that both engines' jittered rays meet from either side",
     "ShaderNodeTexVoronoi": "powers of Minkowski's metric are rounded differently",
 }
 # Rows (a part of their name) in which Cycles does not agree with itself.
