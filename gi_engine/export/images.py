@@ -28,7 +28,7 @@ PNG_MAGIC, PNG_DEPTH_AT = b"\x89PNG", 24
 HEAD_BYTES = 64  # enough to tell the format
 TILE_TOKENS = ("<UDIM>", "<UVTILE>")
 
-# Files that could not be read, as they were then. Trying again makes datablocks, of which Blender tells the viewport, which reads again …
+# What could not be read, by path, and as it was then. Trying again makes datablocks, of which Blender tells the viewport, which reads again …
 _hopeless: dict[str, tuple] = {}
 _scratch = np.empty(0, np.float32)  # reused from image to image: paging in a fresh one takes longer than the copy
 
@@ -103,17 +103,17 @@ def read_file(like, path: str, packed: bytes | None, warn) -> Image:
     pixels = bytes_of_file(path, packed)
     if pixels is not None:
         return from_file_bytes(like, pixels)
-    if packed is None and is_hopeless(path):
-        return shown_missing(None, like.name, warn, path)
+    if is_hopeless(path, packed):
+        return shown_missing(None, like.name, warn, path, packed)
     with temporary_image(like, path, packed) as image:
-        return read_datablock(image, like.name, warn, path)
+        return read_datablock(image, like.name, warn, path, packed)
 
 
-def read_datablock(image, name: str, warn, path: str) -> Image:
-    """What Blender has loaded, or loads now and lets go of again. `image` may be None."""
+def read_datablock(image, name: str, warn, path: str, packed: bytes | None = None) -> Image:
+    """What Blender has loaded, or loads now and lets go of again. `image` may be None, and of a file or what a user's image has `packed`."""
     stays = image is None or image.has_data
     if image is None or not load(image):
-        return shown_missing(image, name, warn, path)
+        return shown_missing(image, name, warn, path, packed)
     if image.is_float:
         found = from_floats(image, name)
     else:
@@ -173,20 +173,23 @@ def load(image) -> bool:
     return image.size[0] > 0 and image.size[1] > 0 and len(image.pixels) >= image.size[0] * image.size[1]
 
 
-def shown_missing(image, name: str, warn, path: str) -> Image:
+def shown_missing(image, name: str, warn, path: str, packed: bytes | None = None) -> Image:
     warn(f"image '{name}' shows magenta: {trouble(image, path)}")
-    _hopeless[path] = stamp(path)
+    if packed is not None or image is None or not image.packed_file:  # else the file at that path has no part in it
+        _hopeless[path] = stamp(path, packed)
     return missing(name)
 
 
-def is_hopeless(path: str) -> bool:
-    """Whether there is no such file, or it is still the one that could not be read."""
-    now = stamp(path)
+def is_hopeless(path: str, packed: bytes | None = None) -> bool:
+    """Whether there is no such file, or it is still the one that could not be read; or the same of what is packed."""
+    now = stamp(path, packed)
     return not now or _hopeless.get(path) == now
 
 
-def stamp(path: str) -> tuple:
-    """By which a file is known again; empty where there is none."""
+def stamp(path: str, packed: bytes | None = None) -> tuple:
+    """By which a file, or what is packed, is known again; empty where there is none."""
+    if packed is not None:
+        return "packed", len(packed), hash(bytes(packed))
     try:
         found = os.stat(path)
     except OSError:

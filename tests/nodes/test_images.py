@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gi_engine import native
-from gi_engine.export.images import image_key, read_image
+from gi_engine.export.images import image_key, read_file, read_image
 from gi_engine.nodes.compile import Compiler
 from gi_engine.scene_data import Scene
 
@@ -276,6 +276,30 @@ def test_what_cannot_be_read_does_not_keep_the_viewport_reading(source, how, tmp
         write_png(path)
         tile, warnings = read(image, user)
         assert not warnings and tuple(tile.pixels[0, 0]) == SRGB_ORANGE
+
+
+def test_what_is_packed_and_damaged_is_not_read_again_and_again(tmp_path):
+    """Nor is the file blamed that lies where it came from."""
+    path = write_png(tmp_path / "f_1.png")
+    like = bpy.data.images.load(str(path))
+    changes, said = [], []
+
+    def notice(*_):
+        changes.append(1)
+
+    def tile(packed):
+        return read_file(like, str(path), packed, said.append).pixels[0, 0]
+
+    damaged = b"no picture at all" * 40
+    tile(damaged)
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.append(notice)
+    found = tile(damaged)
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.remove(notice)
+    assert len(said) == 2 and tuple(found) == (255, 0, 255, 255)
+    assert not changes
+    assert tuple(tile(None)) == SRGB_ORANGE and tuple(tile(path.read_bytes())) == SRGB_ORANGE and len(said) == 2
 
 
 def user_of(image):

@@ -272,7 +272,8 @@ const Descriptor& irradiance_cache_descriptor() {
           {"error", "Error", Kind::kFloat, 0.15, 0.01, 1,
            "Allowed between records: less has more of them, shows finer changes of light and takes longer"},
           {"record_samples", "Samples", Kind::kInt, 128, 16, 1 << 20,
-           "Rays over the hemisphere of each record, to begin with and each time that it is refined"},
+           "Rays of each record to begin with: some over all of the hemisphere, more where those found light. Refining adds as many as the "
+           "latter"},
           {"refinement", "Refinement", Kind::kFloat, 0.25, 0, 0.95,
            "Share of the passes' time in which records get more rays: blotches fade as noise does. 0 leaves them as they were first"},
           {"smoothing", "Smoothing", Kind::kFloat, 3, 0, 10,

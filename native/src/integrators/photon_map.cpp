@@ -475,7 +475,8 @@ const Descriptor& photon_map_descriptor() {
           {"record_error", "Cache Error", Kind::kFloat, 0.15, 0.01, 1,
            "Allowed between records of the irradiance cache: less shows finer changes of light, and takes longer"},
           {"record_samples", "Cache Samples", Kind::kInt, 256, 16, 1 << 20,
-           "Rays over the hemisphere of each record, to begin with and each time that it is refined"},
+           "Rays of each record to begin with: some over all of the hemisphere, more where those found light. Refining adds as many as the "
+           "latter"},
           {"max_bounces", "Total", Kind::kInt, 12, 0, 1024, "Bounces of any kind"},
           {"diffuse_bounces", "Diffuse", Kind::kInt, 4, 0, 1024, "Diffuse reflections"},
           {"glossy_bounces", "Glossy", Kind::kInt, 4, 0, 1024, "Glossy and mirror reflections"},

@@ -69,7 +69,7 @@ GatheredIrradiance gather_irradiance(Vec3 position, Vec3 normal, int samples, co
     std::vector<float>& seen = that_way[turn];
     const auto quarter = seen.begin() + std::ptrdiff_t(seen.size() / 4);
     std::nth_element(seen.begin(), quarter, seen.end());
-    result.around[turn] = seen.empty() ? result.around[turn - 1] : *quarter;  // of four sectors: each serves two
+    result.around[turn] = seen.empty() ? result.around[turn - 1] : *quarter;  // of six sectors or seven some serve two
   }
 
   for (int j = 0; j < rings; ++j)

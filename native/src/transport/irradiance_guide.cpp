@@ -77,7 +77,7 @@ void IrradianceGuide::settle() {
   double below = 0;
   for (size_t i = 0; i < size_t(kCells); ++i) {
     below_[i] = float(below);
-    const float share = sum > 0.0f ? weight[i] / sum : 1.0f / float(kCells);
+    const float share = sum > 0.0f && std::isfinite(sum) ? weight[i] / sum : 1.0f / float(kCells);
     below += kUnguided / double(kCells) + (1.0 - kUnguided) * double(share);
   }
   below_[kCells] = 1.0f;
