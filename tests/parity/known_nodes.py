@@ -1,11 +1,6 @@
 """Nodes that give other values than in Cycles, and why: rows of docs/parity-nodes.md that are known to fail."""
 
 KNOWN: dict[str, str] = {}
-# In one of Blender's versions, or by a pixel more or less than is allowed.
-SOMETIMES: dict[str, str] = {
-    "ShaderNodeWireframe": "where wires in pixels end is a jump that both engines' jittered rays meet from either side",
-    "ShaderNodeTexVoronoi": "powers of Minkowski's metric are rounded differently",
-}
 # Rows (a part of their name) in which Cycles does not agree with itself.
 CYCLES_OWN: dict[tuple[str, str], str] = {
     (

@@ -21,6 +21,7 @@ PER_SHEET = 100
 TOLERANCE = 1e-3  # of a value, relative where it is larger than 1
 OUTLIERS = 1e-3  # part of a row's pixels, and at least FEW_PIXELS
 FEW_PIXELS = 4
+SEEDS = range(11, 19)
 JITTER = 0.04
 COARSE, ENOUGH = 0.5, 0.3
 RANDOM = {"ShaderNodeAmbientOcclusion", "ShaderNodeBevel"}  # Cycles traces rays of its own for these
@@ -57,36 +58,57 @@ def results(rows: list[Row]) -> list[Result]:
 
 
 def value_sheet(rows: list[Row]) -> list[Result]:
+    """What differs is rendered again by several seeds: a jump or cusp that lies within the rays' jitter is met from both sides then.
+
+    Voronoi's Minkowski distance with an exponent of .19 changes by up to 14 % within the jitter; where Cycles' own rays meet the surface,
+    the formula gives Cycles' values to 7e-7 (in double precision to 5e-5), so that rounding is not what tells the engines apart."""
+    found = values_of(rows, SEEDS[:1])
+    again = [i for i, result in enumerate(found) if result.state == "differs"]
+    if again:
+        for i, result in zip(again, values_of([rows[i] for i in again], SEEDS), strict=True):
+            found[i] = result
+    return found
+
+
+def values_of(rows: list[Row], seeds) -> list[Result]:
     made = case_of(rows, patch, nothing, samples=1)
     scene = empty(made.size)
     made.build(scene)
     compare.neutral(scene, 1)
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "GAUSSIAN", 0.01  # rays through the middle of pixels
     said = warnings_of(rows)
-    theirs, ours = compare.render(scene, CYCLES, 11), compare.render(scene, OURS, 11)
+    theirs, ours = (np.stack([compare.render(scene, engine, seed) for seed in seeds]) for engine in (CYCLES, OURS))
     found = []
     for i, row in enumerate(rows):
-        where = tile_region(made, i)
-        found.append(pixels_of(row, theirs[where], ours[where], said.get(i)))
+        y, x = tile_region(made, i)
+        found.append(pixels_of(row, theirs[:, y, x], ours[:, y, x], said.get(i)))
     return found
 
 
 def pixels_of(row: Row, theirs: np.ndarray, ours: np.ndarray, said: list | None) -> Result:
+    """Of pictures by several seeds, by how much all values of a pixel in one engine are above all of the other's."""
     if said is None:
         return Result(row.idname, row.name, "unavailable")
     theirs = np.nan_to_num(theirs, posinf=0, neginf=0)
-    size = np.maximum(1.0, np.abs(theirs))
-    # Both jitter their rays by a hundredth of a pixel, with which a value changes by as much of what it does over a pixel.
-    change = change_over_pixel(theirs)
-    difference = np.maximum(np.abs(ours - theirs) - JITTER * change, 0.0) / size
+    size = np.maximum(1.0, np.abs(theirs[0]))
+    # Both jitter their rays by a hundredth of a pixel, with which a value changes by as much of what it does over a pixel: several
+    # seeds show by how much.
+    change = change_over_pixel(theirs[0])
+    allowed = JITTER * change if len(theirs) == 1 else 0.0
+    difference = np.maximum(apart(theirs, ours) - allowed, 0.0) / size
     coarse = change <= COARSE * size  # elsewhere, at jumps and poles, no two rays give the same
     if coarse.mean() >= ENOUGH:
         difference[~coarse] = 0.0
-    difference[~np.isfinite(ours)] = np.inf
+    difference[~np.isfinite(ours).all(0)] = np.inf
     wrong = (difference > TOLERANCE).any(-1)
     good = wrong.sum() <= max(OUTLIERS * wrong.size, FEW_PIXELS)
     kept = np.sort(difference.max(-1).ravel())[: -FEW_PIXELS or None]
     return Result(row.idname, row.name, verdict(good, said), float(kept[-1]), float(wrong.mean()), True, said)
+
+
+def apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """How far the ranges over the first axis are from one another; 0 where they overlap."""
+    return np.maximum(np.maximum(a.min(0) - b.max(0), b.min(0) - a.max(0)), 0.0)
 
 
 def change_over_pixel(image: np.ndarray) -> np.ndarray:
