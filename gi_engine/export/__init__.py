@@ -186,7 +186,7 @@ def read_mesh(prototype, wanted: set[str], known=None):
     def read():
         if prototype.style:
             return export_strands(prototype.mesh, prototype.name, wanted, prototype.style)
-        with readable(prototype.object, prototype.mesh) as mesh:
+        with readable(prototype.object, prototype.mesh, wanted) as mesh:
             return export_mesh(mesh, prototype.name, wanted, prototype.is_deformed)
 
     return known.read(prototype, wanted, read) if known else read()

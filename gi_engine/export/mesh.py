@@ -13,19 +13,30 @@ from .. import native
 from ..nodes.attributes import ACTIVE_COLOR, ISLAND, POINTINESS, UNDEFORMED, VERTEX_NORMAL
 from ..scene_data import Attribute, Mesh
 from .arrays import is_triangulated, read, read_attribute, triangle_corners
+from .version import sharp_edges_part_meshes
 
 
 @contextmanager
-def readable(item, mesh):
+def readable(item, mesh, wanted: set[str]):
     """The mesh of an evaluated object with its attributes: while it is edited, Blender gives but a wrapper of the edit mesh, which has no
-    faces, either, until a window has drawn it."""
-    if "position" in mesh.attributes or not (mesh.is_editmode or mesh.polygons):
+    faces, either, until a window has drawn it. Cut apart where that shows."""
+    parted = is_parted(mesh, wanted)
+    if not parted and ("position" in mesh.attributes or not (mesh.is_editmode or mesh.polygons)):
         yield mesh
         return
     try:
-        yield item.to_mesh()
+        copy = item.to_mesh()
+        if parted:
+            copy.split_faces()
+        yield copy
     finally:
         item.to_mesh_clear()
+
+
+def is_parted(mesh, wanted: set[str]) -> bool:
+    """Whether it is read without what its sharp edges hold together: that shows where it is displaced, and in random numbers of islands."""
+    shows = VERTEX_NORMAL in wanted or ISLAND in wanted
+    return shows and sharp_edges_part_meshes() and mesh.normals_domain == "CORNER"
 
 
 def export_mesh(mesh, name: str, wanted: set[str], deformed: bool = False) -> Mesh | None:
@@ -50,7 +61,7 @@ def export_mesh(mesh, name: str, wanted: set[str], deformed: bool = False) -> Me
     return Mesh(
         name=name,
         positions=read_positions(mesh),
-        corner_vert=read(mesh.attributes[".corner_vert"].data, "value", 1, np.int32),
+        corner_vert=corner_vertices(mesh),
         tri_corner=tri_corner,
         tri_face=read(mesh.loop_triangle_polygons, "value", 1, np.int32) if by_face and not triangulated else None,
         face_material=read(material.data, "value", 1, np.int32) if material else None,
@@ -71,10 +82,20 @@ def read_positions(mesh) -> np.ndarray:
     return buffer[:count].reshape(-1, 3)
 
 
+def corner_vertices(mesh) -> np.ndarray:
+    """(C,) int32"""
+    return read(mesh.attributes[".corner_vert"].data, "value", 1, np.int32)
+
+
 def read_normals(mesh, wanted: set[str]) -> tuple[str, np.ndarray | None]:
     # Corner normals hold sharp edges and custom normals; asking for them where they are not needed costs
     # memory that Blender keeps.
     domain = mesh.normals_domain
+    if is_parted(mesh, wanted):
+        normals = read(mesh.vertex_normals, "vector", 3, np.float32)
+        corners = triangle_corners(mesh).ravel()
+        normals[corner_vertices(mesh)[corners]] = read(mesh.corner_normals, "vector", 3, np.float32)[corners]
+        return "POINT", normals
     if domain == "CORNER":
         return domain, read(mesh.corner_normals, "vector", 3, np.float32)
     if domain == "POINT" or VERTEX_NORMAL in wanted:

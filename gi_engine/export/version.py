@@ -38,6 +38,11 @@ def tangents_are_undisplaced() -> bool:
     return bpy.app.version < (5, 0, 0)
 
 
+def sharp_edges_part_meshes() -> bool:
+    """Up to Blender 4.5 Cycles cuts meshes apart along sharp edges, and its vertices have the only normals there are."""
+    return bpy.app.version < (5, 0, 0)
+
+
 def thickness_is_unscaled() -> bool:
     """Up to Blender 4.5 the thickness of curves, which their nodes ask for, is that of the object before it is scaled."""
     return bpy.app.version < (5, 0, 0)

@@ -74,6 +74,14 @@ class Stage:
     def link(self, output, socket):
         return self.tree.links.new(output, socket)
 
+    def harden(self) -> None:
+        """Some faces flat, some edges sharp: the mesh has normals of corners."""
+        mesh = self.object.data
+        mesh.polygons.foreach_set("use_smooth", [k % 5 != 0 for k in range(len(mesh.polygons))])
+        sharp = mesh.attributes.new("sharp_edge", "BOOLEAN", "EDGE")
+        sharp.data.foreach_set("value", [k % 4 == 0 for k in range(len(mesh.edges))])
+        assert mesh.normals_domain == "CORNER"
+
     def waves(self, scale=9.0):
         """A smooth height that varies over the surface."""
         apart, product = self.new("ShaderNodeSeparateXYZ"), self.new("ShaderNodeMath", operation="MULTIPLY")

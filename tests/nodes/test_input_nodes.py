@@ -30,3 +30,13 @@ def test_output(stage, idname, output):
     assert not stage.warnings
     if output not in {"Is Shadow Ray", "Is Diffuse Ray", "Ray Depth", "Transparent Depth", "Backfacing"}:
         assert image.any()
+
+
+@pytest.mark.parametrize("hard", [False, True])
+@pytest.mark.parametrize("output", ["Pointiness", "Random Per Island"])
+def test_outputs_that_look_at_edges(stage, output, hard):
+    """Up to Blender 4.5 sharp edges part a mesh."""
+    if hard:
+        stage.harden()
+    stage.show(stage.new("ShaderNodeNewGeometry").outputs[output])
+    assert stage.check().any()
