@@ -56,7 +56,8 @@ ANY = {
     "principled": of("ShaderNodeBsdfPrincipled", None, Base_Color=RED, Roughness=0.4),
 }
 # Cycles evaluates these closures on one side of a fibre's surface and samples them on both: a lamp on the other side it finds by samples
-# alone, of which it loses those that it takes for found by both.
+# alone, of which it loses those that it takes for found by both. Under a lamp and a sky that are sampled, tiles here are .5 to .9 % brighter
+# than Cycles'; under a sky that is met by chance alone, they are as bright to 1e-4.
 STRANDS = {
     "reflection": strand("Reflection", RoughnessU=0.3, RoughnessV=0.5),
     "reflection, narrow": strand("Reflection", RoughnessU=0.1, RoughnessV=0.3, Offset=0.2),
@@ -68,8 +69,8 @@ FIBRES = {
     "chiang, coat": hair("CHIANG", Coat=0.6, Roughness=0.5),
     "chiang, dark": hair("CHIANG", Color=(0.05, 0.02, 0.01)),
 }
-# Lit by the sky alone, which Cycles finds by samples nearly always: where it evaluates the model, for a lamp, light that is reflected more
-# than once within the fibre is a fifth of what its samples bring.
+# Lit by the sky alone, too: where Cycles evaluates the model, for a lamp, light that is reflected more than once within the fibre is a
+# fifth of what its samples bring.
 MICROFACETS = {
     "huang": hair("HUANG", Aspect_Ratio=1.0),
     "huang, elliptic": hair("HUANG", Aspect_Ratio=0.6),
@@ -79,7 +80,9 @@ MICROFACETS = {
 
 
 def sky():
+    """Found by rays alone."""
     world((0.8, 0.9, 1.0))
+    bpy.context.scene.world.cycles.sampling_method = "NONE"
 
 
 def tubes(build):
@@ -98,8 +101,8 @@ def of_tubes(case):
 CASES = [
     sheet("hair", ANY | FIBRES, tuft, light),
     of_tubes(sheet("tubes", ANY | FIBRES, tuft, light)),
-    sheet("hair, strands", STRANDS, tuft, light, tolerance=0.015),
-    sheet("hair, microfacets", MICROFACETS, tuft, sky, tolerance=0.015),
+    sheet("hair, strands", STRANDS, tuft, sky),
+    sheet("hair, microfacets", MICROFACETS, tuft, sky),
     sheet(
         "points", {name: make for name, make in ANY.items() if name != "anisotropic"}, drops, light
     ),  # they have no tangent

@@ -58,8 +58,9 @@ void hair_chiang(const Operands& o, ShadeState& s) {
 
 // weight, absorption, roughness, offset, ior, aspect, R, TT, TRT; along the fibre, where a ribbon is met, whether it is a strand, its
 // diameter (metres); its own normal, along which the long axis lies, taken for the world's as in Cycles; as add_fibre. Rays that pass an
-// elliptic fibre, which is traced as a round one, go on. Where the camera sees the fibre wider than a pixel, it sees the pixel's part of
-// the width alone.
+// elliptic fibre, which is traced as a round one, go on. Where the camera sees the fibre wider than a pixel, it sees a part of the width
+// alone, half as wide as the pixel: of equal parts, so that none counts more than another; about where a ray meets the fibre, edges would
+// count less.
 void hair_huang(const Operands& o, ShadeState& s) {
   if (!s.bsdf || (o.f(6) <= 0.0f && o.f(7) <= 0.0f && o.f(8) <= 0.0f)) return;
   const Vec3 y = normalize(o.v(9)), across = normalize(cross(y, s.point.wo));
@@ -75,7 +76,10 @@ void hair_huang(const Operands& o, ShadeState& s) {
     return;
   }
   const float pixel = s.point.footprint / (0.5f * o.f(12));  // over the fibre's radius
-  if (strand && (s.point.path.kind & kRayCamera) && pixel > 0.0f && wide > pixel) lobe.h_from = h - pixel, lobe.h_to = h + pixel;
+  if (strand && (s.point.path.kind & kRayCamera) && pixel > 0.0f && wide > pixel) {
+    const float parts = std::ceil(2.0f * wide / pixel), part = 2.0f * wide / parts;
+    lobe.h_from = part * std::clamp(std::floor((h + wide) / part), 0.0f, parts - 1.0f) - wide, lobe.h_to = lobe.h_from + part;
+  }
   add_fibre(s, Rgb(o.f(0)), lobe, x, y, o.imm(14) != 0);
 }
 
