@@ -115,7 +115,7 @@ class KnownImages(Known):
 @dataclass
 class KnownProgram:
     program: Program
-    notes: object  # nodes.compile.Notes
+    notes: object  # nodes.resources.Notes
 
 
 class KnownPrograms(Known):
@@ -132,11 +132,11 @@ class KnownPrograms(Known):
         for uid in changed:
             self.known.pop(uid, None)
 
-    def read(self, owner, compiler, compile_program) -> Program:
+    def read(self, owner, resources, compile_program) -> Program:
         uid = owner.original.session_uid if owner else 0
         found = self.known.get(uid)
-        if not found or not compiler.serve_again(found.notes):
-            notes = compiler.begin_notes()
+        if not found or not resources.serve_again(found.notes):
+            notes = resources.begin_notes()
             found = KnownProgram(compile_program(owner), notes)
             self.reads += 1
             if notes.lasting:

@@ -57,7 +57,7 @@ class Shaders:
     def program(self, owner, compile_program):
         if self.known is None:
             return compile_program(owner)
-        return self.known.programs.read(owner, self.compiler, compile_program)
+        return self.known.programs.read(owner, self.compiler.resources, compile_program)
 
     def wanted_attributes(self) -> set[str]:
         """Names of what programs read of meshes, and of objects (nodes/attributes.py)."""

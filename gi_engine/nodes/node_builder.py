@@ -1,4 +1,4 @@
-"""What a rule sees of its node: inputs, outputs, instructions, warnings. No bpy. Following links is compile.py's work."""
+"""What a rule sees of its node: inputs, outputs, instructions, warnings. No bpy. Following links is links.py's work."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ class NodeBuilder:
     def __init__(self, walker, context, node):
         self.walker, self.context, self.node = walker, context, node
         self.builder = walker.builder
-        self.compiler = walker.compiler
+        self.resources = walker.resources
         self.op = walker.builder.op
         self.constant = walker.builder.constant
         self.table = walker.builder.table
         self.component = walker.builder.component
         self.as_kind = walker.builder.as_kind
-        self.attribute = walker.compiler.attribute
+        self.attribute = walker.resources.attribute
         self.made: dict[str, Value] = {}
 
     def socket(self, identifier: str):
@@ -78,14 +78,14 @@ class NodeBuilder:
 
     def matrix_of(self, owner):
         """The object to world matrix of another object that the node refers to."""
-        return self.compiler.matrix_of(owner)
+        return self.resources.matrix_of(owner)
 
     def image(self, key, load) -> int:
-        return self.compiler.image(key, load)
+        return self.resources.image(key, load)
 
     def warn(self, text: str) -> None:
         """One warning for the user, naming the material and this node."""
-        self.walker.approximate(self.node, text)
+        self.walker.remarks.approximate(self.node, text)
 
     def need(self, what: str) -> None:
         """Says that it takes an integrator that carries `what` ("subsurface", "absorption", "volumes", "portals")."""

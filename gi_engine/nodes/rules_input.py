@@ -131,7 +131,7 @@ def uv_map(b):
 def attribute(b):
     kind, name = b.node.attribute_type, b.node.attribute_name
     if kind == "VIEW_LAYER" or not name:
-        value = b.compiler.view_layer_attribute(name) if name else (0.0, 0.0, 0.0, float(kind == "GEOMETRY"))
+        value = b.resources.view_layer_attribute(name) if name else (0.0, 0.0, 0.0, float(kind == "GEOMETRY"))
         vector, mean, alpha = b.constant(*value[:3]), b.constant(sum(value[:3]) / 3.0), b.constant(value[3])
     else:
         slot = b.attribute(attribute_name(kind, name))
@@ -177,7 +177,7 @@ def light_path(b):
 
 @rule("GeometryNodeInputSceneTime")
 def scene_time(b):
-    seconds, frame = b.compiler.scene_time()
+    seconds, frame = b.resources.scene_time()
     b.output("Seconds", b.constant(seconds))
     b.output("Frame", b.constant(frame))
 

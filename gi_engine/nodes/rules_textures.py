@@ -245,7 +245,7 @@ def ies(b):
     from ..export.texts import ies_text  # needs bpy
     from ..export.version import ies_ends_in_darkness
 
-    b.compiler.notes.lasting = False  # nobody says when a text or a file changes
+    b.resources.notes.lasting = False  # nobody says when a text or a file changes
 
     direction = b.input("Vector") if b.linked("Vector") else b.op("object_incoming")
     table = ies_table(ies_text(b.node))

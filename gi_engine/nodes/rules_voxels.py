@@ -18,7 +18,7 @@ def point_density(b):
     n = b.node
     if not b.walker.is_volume:
         b.warn("gives 0 on surfaces, as in Cycles")
-    if not b.walker.is_volume or n.object is None or b.compiler.depsgraph is None:
+    if not b.walker.is_volume or n.object is None or b.resources.depsgraph is None:
         b.output("Color", b.constant(0.0, 0.0, 0.0, kind=COLOR))
         b.output("Density", b.constant(0.0))
         return
@@ -35,8 +35,8 @@ def point_density(b):
 
 def point_voxels(b) -> tuple:
     """The floats of all voxels, and the corners of their cube in the space of the object that has the points."""
-    b.compiler.notes.lasting = False  # the points may move
-    depsgraph = b.compiler.depsgraph
+    b.resources.notes.lasting = False  # the points may move
+    depsgraph = b.resources.depsgraph
     b.node.cache_point_density(depsgraph=depsgraph)
     low, high = b.node.calc_point_density_minmax(depsgraph=depsgraph)
     return np.array(b.node.calc_point_density(depsgraph=depsgraph), np.float32), np.array(low), np.array(high)
@@ -52,6 +52,6 @@ def voxel_place(b, low, high):
     to_cube = np.diag([*(1.0 / size), 1.0]) @ np.array(
         [[1, 0, 0, -low[0]], [0, 1, 0, -low[1]], [0, 0, 1, -low[2]], [0, 0, 0, 1]]
     )
-    inverse = to_cube @ np.linalg.inv(np.asarray(b.compiler.matrix_of(b.node.object), float))
+    inverse = to_cube @ np.linalg.inv(np.asarray(b.resources.matrix_of(b.node.object), float))
     place = b.input("Vector") if b.linked("Vector") else b.op("position")
     return b.op("affine", place, *map(tuple, inverse[:3, :3].tolist()), tuple(inverse[:3, 3].tolist()))

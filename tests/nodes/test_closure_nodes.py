@@ -87,22 +87,22 @@ def test_every_shader_has_a_rule(shader):
 
 
 def test_all_inputs_of_the_principled_bsdf_are_read(shader, monkeypatch):
-    from gi_engine.nodes import compile as compiler
+    from gi_engine.nodes.links import Links
+    from gi_engine.nodes.tree_walker import TreeWalker
 
     read = set()
-    value = compiler.TreeWalker.value
-    resolve = compiler.TreeWalker.resolve
+    value, resolve = TreeWalker.value, Links.resolve
 
     def noted(walker, context, socket, *rest):
         read.add(socket.name)
         return value(walker, context, socket, *rest)
 
-    def noted_link(walker, context, socket):
+    def noted_link(links, context, socket):
         read.add(socket.name)
-        return resolve(walker, context, socket)
+        return resolve(links, context, socket)
 
-    monkeypatch.setattr(compiler.TreeWalker, "value", noted)
-    monkeypatch.setattr(compiler.TreeWalker, "resolve", noted_link)
+    monkeypatch.setattr(TreeWalker, "value", noted)
+    monkeypatch.setattr(Links, "resolve", noted_link)
     shows = ("Metallic", "Transmission Weight", "Coat Weight", "Sheen Weight", "Anisotropic", "Emission Strength")
     node = shader.new("ShaderNodeBsdfPrincipled", dict.fromkeys(shows, 0.5))
     shader.compile(node)
