@@ -68,7 +68,7 @@ def test_random_graphs_agree():
         if bpy.data.materials.get(f"graph {seed}") is None:
             continue
         where = tile_region(case, i)
-        found = node_suite.pixels_of(node_rows.Row("graph", str(seed)), theirs[where], ours[where], [])
+        found = node_suite.pixels_of(node_rows.Row("graph", str(seed)), theirs[where][None], ours[where][None], [])
         compared += bool(np.isfinite(theirs[where]).all())
         if found.wrong > TOLERATED:
             wrong.append(f"graph {seed}: {100 * found.wrong:.1f} % of the pixels, by up to {found.worst:.3g}")
