@@ -43,11 +43,9 @@ def point_voxels(b) -> tuple:
 
 
 def voxel_place(b, low, high):
-    """World space is that of the points; the object's own has its bounds for the cube."""
+    """World space is that of the points; the object's own has its bounds for the cube. As in Cycles, Vector is of the world in both."""
     if b.node.space == "OBJECT":
-        if b.linked("Vector"):
-            b.warn("is looked up where it is, not at its Vector, in object space")
-        return generated(b)
+        return b.op("generated_at", b.input("Vector")) if b.linked("Vector") else generated(b)
     size = np.where(high > low, high - low, 1.0)
     to_cube = np.diag([*(1.0 / size), 1.0]) @ np.array(
         [[1, 0, 0, -low[0]], [0, 1, 0, -low[1]], [0, 0, 1, -low[2]], [0, 0, 0, 1]]

@@ -1,5 +1,5 @@
 """Point Density, which Blender has up to 4.5: the glow of a volume by it, as in Cycles, in every interpolation and space, of vertices and of
-particles. Its rows in the table of nodes are on surfaces, where there is none."""
+particles, where a place is and elsewhere. Its rows in the table of nodes are on surfaces, where there is none."""
 
 import bpy
 import numpy as np
@@ -29,17 +29,29 @@ def points(particles: bool):
     return item
 
 
-def glowing(properties: dict, particles: bool):
+def elsewhere(tree):
+    """What is looked up is moved, turned and smaller."""
+    place = node(tree, "ShaderNodeNewGeometry").outputs["Position"]
+    inputs = {"Vector": place, "Location": (0.1, 0.15, -0.1), "Rotation": (0.3, 0.0, 0.5), "Scale": (1.3, 1.2, 1.4)}
+    return node(tree, "ShaderNodeMapping", None, inputs).outputs[0]
+
+
+def glowing(space: str, interpolation: str, color_source: str, moved: bool):
+    particles = color_source.startswith("PARTICLE")
     made = bpy.data.materials.new("dust")
     tree = tree_of(made)
     item = points(particles)
-    source = {
+    properties = {
         "point_source": "PARTICLE_SYSTEM" if particles else "OBJECT",
         "object": item,
         "resolution": 24,
         "radius": 0.25,
+        "space": space,
+        "interpolation": interpolation,
+        "particle_color_source" if particles else "vertex_color_source": color_source,
     }
-    density = node(tree, "ShaderNodeTexPointDensity", {**source, **properties})
+    inputs = {"Vector": elsewhere(tree)} if moved else None
+    density = node(tree, "ShaderNodeTexPointDensity", properties, inputs)
     if particles:
         density.particle_system = item.particle_systems[0]
     color = node(tree, "ShaderNodeVectorMath", {"operation": "ABSOLUTE"}, {0: density.outputs["Color"]})
@@ -50,13 +62,16 @@ def glowing(properties: dict, particles: bool):
     return made
 
 
+# Space, interpolation, what colours are from, whether it is looked up elsewhere.
 CASES = {
-    "closest": ({"interpolation": "Closest", "space": "WORLD", "vertex_color_source": "VERTEX_NORMAL"}, False),
-    "linear": ({"interpolation": "Linear", "space": "WORLD", "vertex_color_source": "VERTEX_NORMAL"}, False),
-    "cubic": ({"interpolation": "Cubic", "space": "WORLD", "vertex_color_source": "VERTEX_NORMAL"}, False),
-    "object": ({"interpolation": "Linear", "space": "OBJECT", "vertex_color_source": "VERTEX_NORMAL"}, False),
-    "particles": ({"interpolation": "Linear", "space": "WORLD", "particle_color_source": "PARTICLE_VELOCITY"}, True),
-    "age": ({"interpolation": "Linear", "space": "OBJECT", "particle_color_source": "PARTICLE_AGE"}, True),
+    "closest": ("WORLD", "Closest", "VERTEX_NORMAL", False),
+    "linear": ("WORLD", "Linear", "VERTEX_NORMAL", False),
+    "cubic": ("WORLD", "Cubic", "VERTEX_NORMAL", False),
+    "object": ("OBJECT", "Linear", "VERTEX_NORMAL", False),
+    "particles": ("WORLD", "Linear", "PARTICLE_VELOCITY", False),
+    "age": ("OBJECT", "Linear", "PARTICLE_AGE", False),
+    "moved": ("WORLD", "Linear", "VERTEX_NORMAL", True),
+    "object, moved": ("OBJECT", "Linear", "VERTEX_NORMAL", True),
 }
 
 
@@ -64,8 +79,7 @@ CASES = {
 def test_as_in_cycles(case):
     compare.register_once()
     scene = empty((32, 32))
-    properties, particles = CASES[case]
-    cube(glowing(properties, particles), 0.8, rotation=(0.1, 0.2, 0.3))
+    cube(glowing(*CASES[case]), 0.8, rotation=(0.1, 0.2, 0.3))
     camera((0, -4, 1), (0, 0, 0), 26.0)
     scene.frame_set(5)
     compare.neutral(scene, 512)

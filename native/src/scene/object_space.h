@@ -20,7 +20,13 @@ inline Vec3 normal_to_world(const ShadeState& s, Vec3 n) {
   return i ? normalize(i->to_object.transposed_vector(n)) : normalize(n);
 }
 
-// The texture space of the mesh as 0..1. `slot`: the attribute that holds positions before deformation, used where there is one.
+// A place in the object's space within the texture space of the mesh, as 0..1.
+inline Vec3 in_texture_space(const MeshData& mesh, Vec3 p) {
+  const Vec3 d = p - mesh.texture_location, size = mesh.texture_size;
+  return Vec3{safe_divide(d.x, size.x), safe_divide(d.y, size.y), safe_divide(d.z, size.z)} * 0.5f + Vec3{0.5f, 0.5f, 0.5f};
+}
+
+// Where the point is in there. `slot`: the attribute that holds positions before deformation, used where there is one.
 inline Vec3 generated_coordinates(const ShadeState& s, int slot) {
   const Instance* i = instance_of(s);
   if (!i) return s.point.object_position;
@@ -31,8 +37,7 @@ inline Vec3 generated_coordinates(const ShadeState& s, int slot) {
     p = {a[0], a[1], a[2]};
   else if (const auto before = s.resources.scene->undisplaced(s.point))
     p = i->to_object.point(before->position);
-  const Vec3 d = p - mesh.texture_location, size = mesh.texture_size;
-  return Vec3{safe_divide(d.x, size.x), safe_divide(d.y, size.y), safe_divide(d.z, size.z)} * 0.5f + Vec3{0.5f, 0.5f, 0.5f};
+  return in_texture_space(mesh, p);
 }
 
 }  // namespace gi

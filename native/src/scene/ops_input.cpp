@@ -23,6 +23,12 @@ void object_normal(const Operands& o, ShadeState& s) { o.set(0, normal_to_object
 void object_incoming(const Operands& o, ShadeState& s) { o.set(0, normal_to_object(s, s.point.wo)); }
 void generated(const Operands& o, ShadeState& s) { o.set(0, generated_coordinates(s, o.imm(1))); }
 
+// of any place in world space; deformation is left out
+void generated_at(const Operands& o, ShadeState& s) {
+  const Instance* i = instance_of(s);
+  o.set(0, i ? in_texture_space(s.resources.scene->mesh(i->mesh), i->to_object.point(o.v(1))) : o.v(1));
+}
+
 void reflection(const Operands& o, ShadeState& s) {
   const ShadingPoint& p = s.point;
   o.set(0, p.instance == kNoId ? p.wo : reflect(p.wo, p.ns));
@@ -208,6 +214,7 @@ const Op kOps[] = {
     {"object_normal", "v", "", 0, kContext, object_normal},
     {"object_incoming", "v", "", 0, kContext, object_incoming},
     {"generated", "v", "", 1, kContext, generated},
+    {"generated_at", "v", "v", 0, kContext, generated_at},
     {"reflection", "v", "", 0, kContext, reflection},
     {"wireframe", "f", "f", 1, kContext, wireframe},
     {"attribute", "vff", "", 1, kContext, attribute},
