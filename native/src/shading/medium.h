@@ -1,6 +1,7 @@
 // What fills a volume at one place: how much it takes, scatters and emits per metre, and how it scatters.
 // Directions point away from the place, as at surfaces. Leaves out where media are (transport/media.h).
 #pragma once
+#include <memory>
 #include <optional>
 #include <variant>
 
@@ -14,6 +15,14 @@ class Medium {
  public:
   Rgb sigma_t, emission;  // per metre; radiance per metre
 
+  Medium() {}
+  Medium(const Medium& other) { *this = other; }
+  Medium& operator=(const Medium& other) {
+    sigma_t = other.sigma_t, emission = other.emission, count_ = other.count_;
+    for (int i = 0; i < count_; ++i) std::construct_at(&lobes_[i], other.lobes_[i]);
+    return *this;
+  }
+
   // Takes `sigma_s` out of the beam and scatters it by Draine's phase function, or Fournier and Forand's. What comes after the fourth is
   // scattered as the fourth.
   void add_scattering(Rgb sigma_s, float g, float alpha) {
@@ -25,7 +34,7 @@ class Medium {
     sigma_t += other.sigma_t, emission += other.emission;
     for (int i = 0; i < other.count_; ++i) {
       if (count_ < kMost)
-        lobes_[count_++] = other.lobes_[i];
+        std::construct_at(&lobes_[count_++], other.lobes_[i]);
       else
         lobes_[kMost - 1].sigma_s += other.lobes_[i].sigma_s;
     }
@@ -95,7 +104,7 @@ class Medium {
     sigma_t += sigma_s;
     if (is_black(sigma_s)) return;
     if (count_ == kMost) return void(lobes_[kMost - 1].sigma_s += sigma_s);
-    lobes_[count_++] = {sigma_s, phase};
+    std::construct_at(&lobes_[count_++], Lobe{sigma_s, phase});
   }
   float total() const {
     float sum = 0.0f;
@@ -103,7 +112,9 @@ class Medium {
     return sum;
   }
 
-  Lobe lobes_[kMost];
+  union {  // those in use alone are made and copied: media are, at every step of a way
+    Lobe lobes_[kMost];
+  };
   int count_ = 0;
 };
 
