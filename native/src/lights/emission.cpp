@@ -46,9 +46,9 @@ EmittedRay LightSet::Impl::emit_world(Vec2 u_place, Vec2 u_direction) const {
 
 // ---------------------------------------------------------------- the other way round
 
-std::optional<LightSample> LightSet::Impl::arriving_lamp(const EmittedRay& emitted, const LightQuery& query) const {
+std::optional<LightSample> LightSet::Impl::arriving_lamp(const EmittedRay& emitted, const LightQuery& query, bool with_pdf) const {
   const Lamp& lamp = lamps[emitted.light];
-  const auto s = std::visit([&](const auto& shape) { return gi::arriving(shape, query, emitted.ray); }, lamp.shape);
+  const auto s = std::visit([&](const auto& shape) { return gi::arriving(shape, query, emitted.ray, with_pdf); }, lamp.shape);
   if (!s || !(s->scale > 0.0f)) return std::nullopt;
   LightSample l = lamp_sample(lamp, emitted.light, query, *s);
   if (!is_finite(l.radiance) || !std::isfinite(l.pdf_dir)) return std::nullopt;
@@ -87,10 +87,10 @@ bool LightSet::turns_to(const EmittedRay& emitted, Vec3 position) const {
 
 float LightSet::emitted_power() const { return float(impl_->emitters.total()); }
 
-std::optional<LightSample> LightSet::arriving(const EmittedRay& emitted, const LightQuery& query) const {
+std::optional<LightSample> LightSet::arriving(const EmittedRay& emitted, const LightQuery& query, bool with_pdf) const {
   const Impl& impl = *impl_;
   const Vec3 wi = -emitted.ray.direction;
-  return emitted.light < impl.first_triangle() ? impl.arriving_lamp(emitted, query)
+  return emitted.light < impl.first_triangle() ? impl.arriving_lamp(emitted, query, with_pdf)
          : emitted.light < impl.world_light()  ? impl.arriving_triangle(emitted, query)
                                                : std::optional(impl.world_sample(query, wi, impl.world.pdf_dir(query, wi)));
 }

@@ -90,7 +90,7 @@ inline float emitted_power(const SunLight& light, const SceneBall& ball) { retur
 
 // What the lamp's `sample` would have said where a ray that it emitted has arrived.
 template <class S>
-std::optional<ShapeSample> arriving(const S& light, const LightQuery& query, const Ray& emitted) {
+std::optional<ShapeSample> arriving(const S& light, const LightQuery& query, const Ray& emitted, bool with_pdf) {
   const Vec3 wi = -emitted.direction;
   if constexpr (std::is_same_v<S, SunLight>) {
     if (!light.has_shape()) return ShapeSample{wi, kInf, light.scale, 1.0f, true};
@@ -110,7 +110,7 @@ std::optional<ShapeSample> arriving(const S& light, const LightQuery& query, con
     }
     const auto t = light.intersect({query.position, wi});
     if (!t) return std::nullopt;
-    return ShapeSample{wi, *t, light.radiance(query.position, wi), light.pdf_dir(query, wi), false};
+    return ShapeSample{wi, *t, light.radiance(query.position, wi), with_pdf ? light.pdf_dir(query, wi) : 0.0f, false};
   }
 }
 

@@ -278,7 +278,7 @@ struct LightSet::Impl {
   std::optional<EmittedRay> emit_lamp(uint32_t light, Vec2 u_place, Vec2 u_direction) const;
   std::optional<EmittedRay> emit_triangle(uint32_t light, Vec2 u_place, Vec2 u_direction) const;
   EmittedRay emit_world(Vec2 u_place, Vec2 u_direction) const;
-  std::optional<LightSample> arriving_lamp(const EmittedRay& emitted, const LightQuery& query) const;
+  std::optional<LightSample> arriving_lamp(const EmittedRay& emitted, const LightQuery& query, bool with_pdf) const;
   std::optional<LightSample> arriving_triangle(const EmittedRay& emitted, const LightQuery& query) const;
 
   std::optional<float> meet(uint32_t index, const Ray& ray, uint32_t visibility) const {

@@ -85,8 +85,9 @@ class LightSet {
   // Whether light that was emitted like this is what `position` sees: Blender's lamps of soft falloff turn to whoever looks.
   bool turns_to(const EmittedRay& emitted, Vec3 position) const;
   // What `sample` would have said at `query` of light that was emitted like this and arrived there, its choice of this light left out;
-  // none where that point does not see it (lamps of soft falloff turn to whoever looks).
-  std::optional<LightSample> arriving(const EmittedRay& emitted, const LightQuery& query) const;
+  // none where that point does not see it (lamps of soft falloff turn to whoever looks). The density of shapes costs about as much as all
+  // else; without `with_pdf` it may be left at 0.
+  std::optional<LightSample> arriving(const EmittedRay& emitted, const LightQuery& query, bool with_pdf = true) const;
   // Density with which `emit` makes the ray from `light` that arrives at `position` from `wi`: per steradian and square metre across
   // the ray, choice included. Where place or direction is fixed (delta lights) it is left out, and what remains is as seen from
   // `position`; so radiance / pdf_emit is the power of the ray for every kind of light.

@@ -129,7 +129,7 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     if (!(cos_in > 0.0f)) return;
     if (v.is_first()) {
       const LightQuery query = light_query(v.point, v.bsdf);
-      const auto light = context.lights.arriving(*emitted, query);
+      const auto light = context.lights.arriving(*emitted, query, settings.weighs);
       const float pdf_emit = context.lights.pdf_emit(emitted->light, v.point.position, v.point.wo);
       if (!light || !(pdf_emit > 0.0f)) return;
       v.weights = PartialWeights();
