@@ -137,31 +137,51 @@ def bowl(top):
     )
 
 
-@pytest.mark.parametrize("way", ["GATHERED", "CACHED", "PHOTONS"])
-@pytest.mark.parametrize("away", [0.5, 0.02])
+NEAR = 0.025  # to a border, m; pictures are a little smaller, discs of progressive ways four times as wide
+WAYS = {
+    "gathered": ("photon_map", 8, 16, {"global_photons": 50_000, "global_light": "GATHERED"}),
+    "cached": ("photon_map", 8, 16, {"global_photons": 50_000, "global_light": "CACHED"}),
+    "read directly": ("photon_map", 8, 16, {"global_photons": 50_000, "global_light": "PHOTONS"}),
+    "progressive": ("sppm", 8, 16, {"photons": 50_000, "radius": 40, "alpha": 1}),
+    "merged": ("vcm", 64, 64, {"radius": 160, "alpha": 1, "terms": "MERGE"}),
+}
+
+
+def seen(way, scene, place, direction, seeds=8):
+    """Mean of a picture of .04 m, and its standard error."""
+    integrator, samples, pixels, parameters = WAYS[way]
+    runs = [
+        render(integrator, scene, place, direction, 0.04, samples, pixels, seed, **parameters)[0].mean()
+        for seed in range(1, 1 + seeds)
+    ]
+    return np.mean(runs), np.std(runs, ddof=1) / math.sqrt(seeds)
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("away", [0.5, NEAR])
 def test_borders_are_as_bright_as_the_middle(away, way):
     """A bowl cut from a sphere with a lamp in its middle is lit evenly up to its rim: each of its points sees all others alike."""
     top = 0.75 * math.pi
     truth = 0.5 / (1 - 0.5 * (1 - math.cos(top)) / 2)
     angle = top - away
     place = np.array([math.sin(angle), 0, -math.cos(angle)])
-    found = [
-        render(
-            "photon_map",
-            bowl(top),
-            0.5 * place,
-            place,
-            0.02,
-            seed=seed,
-            samples=8,
-            global_photons=50_000,
-            global_light=way,
-        )[0].mean()
-        for seed in range(1, 9)
-    ]
-    error = np.std(found, ddof=1) / math.sqrt(len(found))
+    found, error = seen(way, bowl(top), 0.5 * place, place)
     assert error < 0.02 * truth
-    assert abs(np.mean(found) - truth) < 4 * error + 0.03 * truth
+    assert abs(found - truth) < 4 * error + 0.03 * truth
+
+
+@pytest.mark.parametrize("way", ["progressive", "merged"])
+def test_beside_a_wall_only_photons_before_it_count(way):
+    """A sheet parts a box in two, one side lit a hundred times as bright: little of that shines through it to the floor beside it."""
+    lights = [lamp("POINT", (power,) * 3, matrix=matrix((x, 0, 0))) for power, x in ((100.0, 0.5), (1.0, -0.5))]
+    sheet = quad((0, -1, -1), (0, 1, -1), (0, 1, 1), (0, -1, 1))
+    scene = scene_of((cube(), surface(0.5)), (sheet, surface(0.5)), lights=lights)
+    places = [(x, 0.1, 0) for x in (NEAR, -NEAR)]
+    bright, dark = (render("path", scene, place, (0, 0, -1), 0.04, 512, 16)[0].mean() for place in places)
+    (found_bright, error_bright), (found_dark, error_dark) = (seen(way, scene, place, (0, 0, -1)) for place in places)
+    assert error_bright < 0.02 * bright and error_dark < 0.003 * bright
+    assert abs(found_bright - bright) < 4 * error_bright + 0.03 * bright
+    assert abs(found_dark - dark) < 4 * error_dark + 0.02 * bright
 
 
 def test_the_caustic_of_a_lens_is_that_of_light_tracing():

@@ -26,6 +26,7 @@ inline Vec2 operator+(Vec2 a, Vec2 b) { return {a.x + b.x, a.y + b.y}; }
 inline Vec2 operator-(Vec2 a, Vec2 b) { return {a.x - b.x, a.y - b.y}; }
 inline Vec2 operator*(Vec2 a, float s) { return {a.x * s, a.y * s}; }
 inline Vec2 operator*(float s, Vec2 a) { return a * s; }
+inline float dot(Vec2 a, Vec2 b) { return a.x * b.x + a.y * b.y; }
 
 // A point, a direction or a normal; also the three floats of a vector socket.
 struct Vec3 {

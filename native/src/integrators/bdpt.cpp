@@ -387,7 +387,7 @@ class BdptIntegrator final : public Integrator {
   Rgb merge(const RenderContext& context, const EyeVertex& z) const {
     const Heuristic h = s_.heuristic;
     Rgb direct, indirect;
-    photons_.near(z.point.position, z.point.ng, radius_ * s_.footprint(z.point.position), [&](const MergeVertex& y, Rgb power_per_area) {
+    photons_.near(context.scene, z.point.position, z.point.ng, radius_ * s_.footprint(z.point.position), [&](const MergeVertex& y, Rgb power_per_area) {
       const Vec3 wi = y.wi.unpack();
       BounceCount bounces = y.bounces();
       bounces.add(bounces_of(z.state));

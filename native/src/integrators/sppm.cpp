@@ -36,7 +36,7 @@ class SppmIntegrator final : public Integrator {
       trace_to_diffuse(
           context, film, s_, camera, ending, sampler, result, [](const ShadingPoint&, const Bsdf&) { return Rgb(); },
           [&](const ShadingPoint& point, const Bsdf& bsdf, bool) {
-            return std::optional(KnownLight{Rgb(), map.radiance(point, bsdf, scale * point.footprint)});
+            return std::optional(KnownLight{Rgb(), map.radiance(context.scene, point, bsdf, scale * point.footprint)});
           });
     });
   }

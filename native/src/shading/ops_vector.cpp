@@ -147,7 +147,7 @@ const Op kOps[] = {
     {"vector_reflect", "v", "vv", 0, kPure, vector_op2<reflect_incident>},
     {"vector_refract", "v", "vvf", 0, kPure, refract_incident},
     {"vector_faceforward", "v", "vvv", 0, kPure, vector_op3<face_forward>},
-    {"vector_dot_product", "f", "vv", 0, kPure, vector_op2<dot>, 0, nullptr, identity::dot_product},
+    {"vector_dot_product", "f", "vv", 0, kPure, vector_op2<[](Vec3 a, Vec3 b) { return dot(a, b); }>, 0, nullptr, identity::dot_product},
     {"vector_distance", "f", "vv", 0, kPure, vector_op2<[](Vec3 a, Vec3 b) { return length(a - b); }>},
     {"vector_length", "f", "v", 0, kPure, vector_op1<[](Vec3 a) { return length(a); }>},
     {"vector_scale", "v", "vf", 0, kPure, scale, 0, nullptr, identity::scaled},

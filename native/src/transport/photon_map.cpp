@@ -21,16 +21,6 @@ std::optional<Photon> within_limits(const LightVertex& v, const BounceLimits& li
   return photon;
 }
 
-// Whether points in a disc lie as they would if all of it were surface, evenly lit: about the middle, and as far in any direction.
-bool is_even(const std::vector<Vec2>& points, float radius_squared) {
-  constexpr float kShift = 0.12f, kSpread = 0.19f;  // of the radius; of its square, where an even disc has 1/4
-  Vec2 mean{0, 0};
-  float xx = 0, xy = 0, yy = 0;
-  for (const Vec2 p : points) mean.x += p.x, mean.y += p.y, xx += p.x * p.x, xy += p.x * p.y, yy += p.y * p.y;
-  const float n = float(points.size()), least = 0.5f * (xx + yy - std::hypot(xx - yy, 2.0f * xy));
-  return sqr(mean.x) + sqr(mean.y) < sqr(kShift * n) * radius_squared && least > kSpread * n * radius_squared;
-}
-
 // Of a photon at a squared distance, that of the border being 1; on average over the disc 1. [Jensen 2001, eq. 7.8 and 7.9; the latter's
 // scale is here what makes the average 1]
 float weight_of(PhotonFilter filter, float distance_squared) {
@@ -179,13 +169,18 @@ size_t PhotonMap::count(Vec3 position, Vec3 normal, float radius) const {
   return found;
 }
 
-Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius) const {
-  Rgb sum;
+Rgb PhotonMap::radiance(const Scene& scene, const ShadingPoint& point, const Bsdf& bsdf, float radius) const {
+  static thread_local std::vector<uint32_t> found;
+  found.clear();
   float radius_squared = sqr(radius);
   tree_.within(point.position, radius_squared, [&](uint32_t k, float) {
-    if (is_of(k, point.position, point.ng, radius)) sum += scattered(point, bsdf, lights_[k]);
+    if (is_of(k, point.position, point.ng, radius)) found.push_back(k);
   });
-  return sum * (scale_ / (kPi * sqr(radius)));
+  Rgb sum;
+  for_each_in_sight(
+      scene, point.position, point.ng, radius, found, [&](uint32_t k) { return tree_.point(k); },
+      [&](uint32_t k, float per_area) { sum += scattered(point, bsdf, lights_[k]) * per_area; });
+  return sum * scale_;
 }
 
 Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count, PhotonFilter filter) const {

@@ -88,8 +88,9 @@ class PhotonMap {
   Vec3 normal(size_t k) const { return lights_[k].normal.unpack(); }
   size_t memory_bytes() const { return lights_.capacity() * sizeof(PhotonLight) + tree_.memory_bytes(); }
 
-  // Radiance towards point.wo of the diffuse lobes, by all photons nearer than `radius`: Σ f Φ / π r². [Jensen 2001, eq. 7.6]
-  Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius) const;
+  // Radiance towards point.wo of the diffuse lobes, by all photons nearer than `radius`: Σ f Φ / π r², or the area of what of the disc is
+  // in sight. [Jensen 2001, eq. 7.6]
+  Rgb radiance(const Scene& scene, const ShadingPoint& point, const Bsdf& bsdf, float radius) const;
   // By the nearest `count` of those within `radius`, in a disc that ends at the farthest.
   Rgb radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count, PhotonFilter filter) const;
   // Power per area on the side of `normal`, by the nearest `count` within `radius` of those that reach `eye`; `farthest`: how far these

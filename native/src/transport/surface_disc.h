@@ -3,6 +3,8 @@
 #pragma once
 #include <array>
 #include <bit>
+#include <cmath>
+#include <vector>
 
 #include "core/sampler.h"
 #include "scene/scene.h"
@@ -31,11 +33,7 @@ class SurfaceDisc {
     const float turn = 2.0f * kPi * number(0), c = std::cos(turn), s = std::sin(turn);
     const Frame even = Frame::from_normal(normal);
     frame_ = {even.x * c + even.y * s, even.y * c - even.x * s, normal};
-    for (int k = 0; k < kSectors; ++k) {
-      const auto wall = look(eye_, direction(float(k) + 0.5f), radius);
-      reach_[size_t(k)] = wall ? *wall : radius;
-      is_open_ = is_open_ && !wall;
-    }
+    for (int k = 0; k < kSectors; ++k) walls_[size_t(k)] = wall_along(direction(float(k) + 0.5f));
   }
 
   Vec2 place(Vec3 p) const {  // in the plane
@@ -43,20 +41,23 @@ class SurfaceDisc {
     return {local.x, local.y};
   }
   bool is_open() const { return is_open_; }  // all of it is in sight
-  bool sees(Vec2 place) const { return sqr(place.x) + sqr(place.y) <= sqr(reach_[sector(place)]); }
+  bool sees(Vec2 place) const {
+    const Wall& wall = walls_[sector(place)];
+    return dot(wall.normal, place) <= wall.distance;
+  }
 
   // The share that is surface and in sight, by chance: rays fall all over what is in sight.
   float share() const {
     constexpr int kRings = 2;
     float sum = 0.0f;
     for (int k = 0; k < kSectors; ++k) {
-      const float reach = reach_[size_t(k)], part = sqr(reach / radius_) / float(kSectors * kRings);
       for (int ring = 0; ring < kRings; ++ring) {
         const uint32_t place = uint32_t(1 + 2 * (k * kRings + ring));
+        const Vec2 along = direction(float(k) + number(place + 1));
+        const float reach = walls_[size_t(k)].reach(along, radius_);
         const float distance = reach * std::sqrt((float(ring) + number(place)) / kRings);
-        const Vec3 from = eye_ + direction(float(k) + number(place + 1)) * distance;
-        const auto ground = look(from, -frame_.z, height_ + kSurfaceSlope * radius_);
-        if (ground && is_on_surface(*ground - height_, distance, radius_)) sum += part;
+        const auto ground = look(eye_ + to_world(along) * distance, -frame_.z, height_ + kSurfaceSlope * radius_);
+        if (ground && is_on_surface(*ground - height_, distance, radius_)) sum += sqr(reach / radius_) / float(kSectors * kRings);
       }
     }
     return std::max(sum, 0.5f / float(kSectors * kRings));
@@ -65,12 +66,36 @@ class SurfaceDisc {
  private:
   static constexpr int kSectors = 8;
 
+  // What ends the sight in a sector, as the straight line in the plane that it would be if it were flat; none: far away.
+  struct Wall {
+    Vec2 normal{0, 0};  // away from the middle
+    float distance = kInf;
+    float reach(Vec2 along, float most) const {
+      const float cosine = dot(normal, along);
+      return cosine * most > distance ? distance / cosine : most;
+    }
+  };
+
+  Wall wall_along(Vec2 along) {
+    const Ray ray{eye_, to_world(along), 0.0f, radius_};
+    const auto hit = scene_.intersect(ray, kRayDiffuse);
+    if (!hit) return {};
+    is_open_ = false;
+    const Vec3 its_normal = frame_.to_local(-scene_.shading_point(ray, *hit, PathState()).ng);
+    const float size = std::hypot(its_normal.x, its_normal.y);
+    const Vec2 normal{its_normal.x / size, its_normal.y / size};
+    constexpr float kLeast = 0.1f;  // where it is nearly level, or seen edgewise, it ends the sight at a right angle
+    if (!(size > kLeast && dot(normal, along) > kLeast)) return {along, hit->t};
+    return {normal, hit->t * dot(normal, along)};
+  }
+
   static uint32_t bits(float x) { return std::bit_cast<uint32_t>(x); }
   float number(uint32_t k) const { return to_unit_float(hash_combine(key_, k)); }
-  Vec3 direction(float sector) const {
+  static Vec2 direction(float sector) {
     const float angle = 2.0f * kPi * sector / kSectors;
-    return frame_.to_world({std::cos(angle), std::sin(angle), 0.0f});
+    return {std::cos(angle), std::sin(angle)};
   }
+  Vec3 to_world(Vec2 along) const { return frame_.to_world({along.x, along.y, 0.0f}); }
   // By the half of the plane, the quarter, and the eighth.
   static size_t sector(Vec2 p) {
     const bool below = p.y < 0.0f;
@@ -89,8 +114,42 @@ class SurfaceDisc {
   Frame frame_;
   float radius_, height_;
   uint32_t key_;
-  std::array<float, kSectors> reach_;
+  std::array<Wall, kSectors> walls_;
   bool is_open_ = true;
 };
+
+// Whether points in a disc lie as they would if all of it were surface, evenly lit: about the middle, and as far in any direction.
+inline bool is_even(const std::vector<Vec2>& points, float radius_squared) {
+  constexpr float kShift = 0.12f, kSpread = 0.19f;  // of the radius; of its square, where an even disc has 1/4
+  Vec2 mean{0, 0};
+  float xx = 0, xy = 0, yy = 0;
+  for (const Vec2 p : points) mean.x += p.x, mean.y += p.y, xx += p.x * p.x, xy += p.x * p.y, yy += p.y * p.y;
+  const float n = float(points.size()), least = 0.5f * (xx + yy - std::hypot(xx - yy, 2.0f * xy));
+  return sqr(mean.x) + sqr(mean.y) < sqr(kShift * n) * radius_squared && least > kSpread * n * radius_squared;
+}
+
+// Calls f(k, 1 / area) for those of the points `found` in a disc that its middle sees along the surface; the area is what it sees of it.
+// Where they lie evenly that is all of the disc, and no ray is sent. at(k): where a point is.
+template <class At, class F>
+void for_each_in_sight(const Scene& scene, Vec3 position, Vec3 normal, float radius, const std::vector<uint32_t>& found, const At& at,
+                       const F& f) {
+  if (found.empty()) return;
+  static thread_local std::vector<Vec2> places;
+  places.clear();
+  const Frame frame = Frame::from_normal(normal);
+  for (const uint32_t k : found) {
+    const Vec3 local = frame.to_local(at(k) - position);
+    places.push_back({local.x, local.y});
+  }
+  const float per_area = 1.0f / (kPi * sqr(radius));
+  if (is_even(places, sqr(radius))) {
+    for (const uint32_t k : found) f(k, per_area);
+    return;
+  }
+  const SurfaceDisc disc(scene, position, normal, radius);
+  const float seen = per_area / disc.share();
+  for (const uint32_t k : found)
+    if (disc.is_open() || disc.sees(disc.place(at(k)))) f(k, seen);
+}
 
 }  // namespace gi
