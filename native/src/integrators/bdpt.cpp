@@ -386,8 +386,17 @@ class BdptIntegrator final : public Integrator {
   // Light subpaths that came here too, all as if to the same point. [Georgiev et al. 2012, eq. 8]
   Rgb merge(const RenderContext& context, const EyeVertex& z) const {
     const Heuristic h = s_.heuristic;
-    Rgb direct, indirect;
-    photons_.near(context.scene, z.point.position, z.point.ng, radius_ * s_.footprint(z.point.position), [&](const MergeVertex& y, Rgb power_per_area) {
+    const Vec3 position = z.point.position;
+    const float radius = radius_ * s_.footprint(position);
+    struct Merged {
+      Rgb light;
+      bool is_direct;
+    };
+    static thread_local std::vector<Merged> merged;
+    static thread_local std::vector<Vec3> places;
+    merged.clear(), places.clear();
+    float weighed = 0.0f, all = 0.0f;
+    photons_.near(position, z.point.ng, radius, [&](const MergeVertex& y, Vec3 place, Rgb power_per_area) {
       const Vec3 wi = y.wi.unpack();
       BounceCount bounces = y.bounces();
       bounces.add(bounces_of(z.state));
@@ -402,8 +411,16 @@ class BdptIntegrator final : public Integrator {
         const float others = y.weights.vcm + h(e.pdf_dir) * y.weights.vc + z.weights.vcm + h(pdf_reverse) * z.weights.vc;
         weight = z.merged / (z.merged + others);
       }
-      (y.is_first && z.state.depth == 0 ? direct : indirect) += power_per_area * e.value * (weight / cosine);
+      const Rgb light = power_per_area * e.value / cosine;
+      weighed += average(light) * weight, all += average(light);
+      merged.push_back({light * weight, y.is_first && z.state.depth == 0}), places.push_back(place);
     });
+    // Looking about costs as much as a few connections: what other ways do better is seldom worth it, nor are few vertices, noisy as they
+    // are.
+    const float chance = std::min(1.0f, 4.0f * safe_divide(weighed, all)) * std::clamp(float(places.size()) / 16.0f, 0.25f, 1.0f);
+    const std::vector<float>& counts = counts_in_sight(context.scene, position, z.point.ng, radius, places, chance);
+    Rgb direct, indirect;
+    for (size_t k = 0; k < merged.size(); ++k) (merged[k].is_direct ? direct : indirect) += merged[k].light * counts[k];
     return clamp_contribution(direct, clamp_direct_) + clamp_contribution(indirect, clamp_indirect_);
   }
 

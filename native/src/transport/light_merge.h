@@ -27,21 +27,16 @@ class LightMerge {
   size_t memory_bytes() const { return vertices_.capacity() * sizeof(MergeVertex) + tree_.memory_bytes(); }
   int paths() const { return paths_; }
 
-  // Calls f(vertex, irradiance of that vertex if it is spread over what is seen of the disc) for those on the surface around `position`.
+  // Calls f(vertex, its place, irradiance of that vertex if it is spread over the disc) for those on the surface around `position`.
   template <class F>
-  void near(const Scene& scene, Vec3 position, Vec3 normal, float radius, const F& f) const {
-    static thread_local std::vector<uint32_t> found;
-    found.clear();
+  void near(Vec3 position, Vec3 normal, float radius, const F& f) const {
     float radius_squared = sqr(radius);
+    const float per_area = 1.0f / (float(paths_) * kPi * radius_squared);
     tree_.within(position, radius_squared, [&](uint32_t k, float) {
-      if (of_one_surface(tree_.point(k) - position, vertices_[k].normal.along(), normal, radius)) found.push_back(k);
+      const MergeVertex& v = vertices_[k];
+      if (!of_one_surface(tree_.point(k) - position, v.normal.along(), normal, radius)) return;
+      f(v, tree_.point(k), Rgb(v.power[0], v.power[1], v.power[2]) * per_area);
     });
-    for_each_in_sight(
-        scene, position, normal, radius, found, [&](uint32_t k) { return tree_.point(k); },
-        [&](uint32_t k, float per_area) {
-          const float* power = vertices_[k].power;
-          f(vertices_[k], Rgb(power[0], power[1], power[2]) * (per_area / float(paths_)));
-        });
   }
 
  private:

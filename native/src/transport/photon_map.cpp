@@ -170,17 +170,18 @@ size_t PhotonMap::count(Vec3 position, Vec3 normal, float radius) const {
 }
 
 Rgb PhotonMap::radiance(const Scene& scene, const ShadingPoint& point, const Bsdf& bsdf, float radius) const {
+  static thread_local std::vector<Vec3> places;
   static thread_local std::vector<uint32_t> found;
-  found.clear();
+  places.clear(), found.clear();
   float radius_squared = sqr(radius);
   tree_.within(point.position, radius_squared, [&](uint32_t k, float) {
-    if (is_of(k, point.position, point.ng, radius)) found.push_back(k);
+    if (is_of(k, point.position, point.ng, radius)) places.push_back(tree_.point(k)), found.push_back(k);
   });
+  const std::vector<float>& counts = counts_in_sight(scene, point.position, point.ng, radius, places);
   Rgb sum;
-  for_each_in_sight(
-      scene, point.position, point.ng, radius, found, [&](uint32_t k) { return tree_.point(k); },
-      [&](uint32_t k, float per_area) { sum += scattered(point, bsdf, lights_[k]) * per_area; });
-  return sum * scale_;
+  for (size_t i = 0; i < found.size(); ++i)
+    if (counts[i] != 0.0f) sum += scattered(point, bsdf, lights_[found[i]]) * counts[i];
+  return sum * (scale_ / (kPi * sqr(radius)));
 }
 
 Rgb PhotonMap::radiance(const ShadingPoint& point, const Bsdf& bsdf, float radius, size_t count, PhotonFilter filter) const {

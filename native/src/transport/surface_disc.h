@@ -22,10 +22,7 @@ inline bool is_on_surface(float off, float distance, float radius) {
 class SurfaceDisc {
  public:
   SurfaceDisc(const Scene& scene, Vec3 position, Vec3 normal, float radius)
-      : scene_(scene),
-        position_(position),
-        radius_(radius),
-        key_(hash_combine(bits(position.x), hash_combine(bits(position.y), bits(position.z)))) {
+      : scene_(scene), position_(position), radius_(radius), key_(key_of(position)) {
     // Above the surface by as much as what is on it may rise, but under what hangs over it.
     height_ = kSurfaceSlope * radius;
     if (const auto above = look(offset_point(position, normal, normal), normal, 2.0f * height_)) height_ = 0.5f * *above;
@@ -34,6 +31,12 @@ class SurfaceDisc {
     const Frame even = Frame::from_normal(normal);
     frame_ = {even.x * c + even.y * s, even.y * c - even.x * s, normal};
     for (int k = 0; k < kSectors; ++k) walls_[size_t(k)] = wall_along(direction(float(k) + 0.5f));
+  }
+
+  // What its random numbers are keyed by.
+  static uint32_t key_of(Vec3 p) {
+    const auto bits = [](float x) { return std::bit_cast<uint32_t>(x); };
+    return hash_combine(bits(p.x), hash_combine(bits(p.y), bits(p.z)));
   }
 
   Vec2 place(Vec3 p) const {  // in the plane
@@ -89,7 +92,6 @@ class SurfaceDisc {
     return {normal, hit->t * dot(normal, along)};
   }
 
-  static uint32_t bits(float x) { return std::bit_cast<uint32_t>(x); }
   float number(uint32_t k) const { return to_unit_float(hash_combine(key_, k)); }
   static Vec2 direction(float sector) {
     const float angle = 2.0f * kPi * sector / kSectors;
@@ -128,28 +130,30 @@ inline bool is_even(const std::vector<Vec2>& points, float radius_squared) {
   return sqr(mean.x) + sqr(mean.y) < sqr(kShift * n) * radius_squared && least > kSpread * n * radius_squared;
 }
 
-// Calls f(k, 1 / area) for those of the points `found` in a disc that its middle sees along the surface; the area is what it sees of it.
-// Where they lie evenly that is all of the disc, and no ray is sent. at(k): where a point is.
-template <class At, class F>
-void for_each_in_sight(const Scene& scene, Vec3 position, Vec3 normal, float radius, const std::vector<uint32_t>& found, const At& at,
-                       const F& f) {
-  if (found.empty()) return;
+// Of each of the points in a disc (`places` in a frame about its middle), what it counts where all of the disc would count 1: nothing where
+// it is out of sight, more where not all is seen. Where they lie evenly no ray is sent. Looks with probability `chance`; right on average.
+inline const std::vector<float>& counts_in_sight(const Scene& scene, Vec3 position, Vec3 normal, float radius,
+                                                 const std::vector<Vec3>& points, float chance = 1.0f) {
   static thread_local std::vector<Vec2> places;
+  static thread_local std::vector<float> counts;
+  counts.assign(points.size(), 1.0f);
+  if (points.empty()) return counts;
   places.clear();
   const Frame frame = Frame::from_normal(normal);
-  for (const uint32_t k : found) {
-    const Vec3 local = frame.to_local(at(k) - position);
+  for (const Vec3 p : points) {
+    const Vec3 local = frame.to_local(p - position);
     places.push_back({local.x, local.y});
   }
-  const float per_area = 1.0f / (kPi * sqr(radius));
-  if (is_even(places, sqr(radius))) {
-    for (const uint32_t k : found) f(k, per_area);
-    return;
-  }
+  if (is_even(places, sqr(radius))) return counts;
+  constexpr uint32_t kStream = 0x6c6f6f6bu;
+  if (!(to_unit_float(hash_combine(SurfaceDisc::key_of(position), kStream)) < chance)) return counts;
   const SurfaceDisc disc(scene, position, normal, radius);
-  const float seen = per_area / disc.share();
-  for (const uint32_t k : found)
-    if (disc.is_open() || disc.sees(disc.place(at(k)))) f(k, seen);
+  const float seen = 1.0f / disc.share();
+  for (size_t k = 0; k < points.size(); ++k) {
+    const float count = disc.sees(disc.place(points[k])) ? seen : 0.0f;
+    counts[k] = 1.0f + (count - 1.0f) / chance;
+  }
+  return counts;
 }
 
 }  // namespace gi
