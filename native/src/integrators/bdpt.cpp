@@ -47,17 +47,9 @@ struct EyeVertex {
   float merged;  // the weight of merging here
 };
 
-// Which vertices are merged: those of a pass's own light paths, within a radius that shrinks from pass to pass.
-struct Merging {
-  int paths = 0;     // at most; 0: none
-  float radius = 0;  // in the first pass, pixels
-  double alpha = 1;
-  bool alone = false;  // nothing else: photon mapping
-};
-
 class BdptIntegrator final : public Integrator {
  public:
-  BdptIntegrator(const Parameters& p, Strategies strategies, Merging merging)
+  BdptIntegrator(const Parameters& p, Strategies strategies, MergeSettings merging)
       : s_{{p.integer("max_bounces"), p.integer("diffuse_bounces"), p.integer("glossy_bounces"), p.integer("transmission_bounces"),
             p.integer("transparent_bounces")},
            {p.integer("heuristic") == 0},
@@ -65,7 +57,7 @@ class BdptIntegrator final : public Integrator {
            p.real("connections")},
         connections_(p.integer("connections")),
         strategies_(strategies),
-        merging_(merging),
+        merge_(merging),
         min_bounces_(p.integer("min_bounces")),
         clamp_direct_(p.real("clamp_direct")),
         clamp_indirect_(p.real("clamp_indirect")) {}
@@ -74,11 +66,10 @@ class BdptIntegrator final : public Integrator {
     const FilmSpec& spec = film.spec();
     if (pass == 0) film.start_splats(splat_unit(context));
     s_.footprint = {context.camera, spec.width, spec.height};
-    if (merging_.paths > 0) set_radius(context, pass, film);
-    if (merging_.paths > 0) send_photons(context, pass, film);
+    if (merge_.is_on()) merge_.begin_pass(context, pass, film, s_);
     tile_trials_.resize(film.tiles().size());
     const auto from_light = [&](const Tile& tile) {
-      if (!merging_.alone) shine(context, pass, film, tile, tile_light());
+      if (!merge_.is_alone()) shine(context, pass, film, tile, tile_light());
     };
     const auto from_eye = [&](const CameraRay& camera, Sampler& sampler, PixelSample& result, int x, int y) {
       const TileLight& light = tile_light();
@@ -98,14 +89,6 @@ class BdptIntegrator final : public Integrator {
     return light;
   }
 
-  int photons_of(const Film& film) const { return std::min(merging_.paths, film.spec().region_width() * film.spec().region_height()); }
-
-  void set_radius(const RenderContext& context, int pass, const Film& film) {
-    radius_ = merging_.radius * float(std::sqrt(shrinking(pass, merging_.alpha)));
-    s_.merges = float(photons_of(film)) * sqr(radius_) * kPi / s_.joined;
-    context.log.set("radius, pixels", double(radius_));
-  }
-
   // Light subpaths aim at where other ways leave most to them: at what they brought in earlier passes when they were joined to the lens,
   // caustics, and what a sky sends through windows. The weights know nothing of it: they part each path among the ways to make it as if
   // light started evenly, and any parting is right [Veach 1997, §9.2.1].
@@ -117,36 +100,6 @@ class BdptIntegrator final : public Integrator {
       tile.clear();
     }
     if (std::has_single_bit(unsigned(passes)) && trials_.size() < kMost) aim_ = EmissionGuide(trials_, kEven);
-  }
-
-  // What eye vertices of this pass will be merged with. Their paths are not those that are joined, so there may be as many as wished; they
-  // aim at what is seen and other ways leave to them.
-  void send_photons(const RenderContext& context, int pass, const Film& film) {
-    const int paths = photons_of(film);
-    constexpr float kWorthLooking = 0.02f;
-    if (pass == 0) seen_ = seen_points(find_ends(context, film, s_.limits, false, kLooksAcross), context.pool);
-    const int rounds = pass == 0 ? EmissionLearner::kFirstRounds : std::has_single_bit(unsigned(pass)) ? 1 : 0;
-    for (int round = 0; round < rounds && !context.cancelled; ++round)
-      photon_aim_.learn(context, s_, paths / 2, [&](const LightVertices& path, Sampler&) {
-        float worth = 0.0f;
-        for (size_t k = 0; k < path.count(); ++k) {
-          const LightVertex& v = path[k];
-          const float share = v.is_first() || v.bsdf.is_delta() ? 0.0f : share_of_merging(v);
-          if (share > kWorthLooking && seen_.near(v.point.position)) worth += average(v.power) * share;
-        }
-        return worth;
-      });
-    SubpathSettings light = s_;
-    light.guide = &photon_aim_.guide();
-    photons_ = LightMerge(context, light, pass, paths);
-    context.log.set("photons", double(photons_.size()));
-  }
-
-  // The weight of merging at a light vertex, against the ways that lie on the light's side.
-  float share_of_merging(const LightVertex& v) const {
-    if (merging_.alone) return 1.0f;
-    const float merged = s_.merged(v.point.position);
-    return merged / (merged + v.weights.vcm + s_.heuristic(kInvPi) * v.weights.vc);
   }
 
   // The light subpaths of a tile.
@@ -223,7 +176,7 @@ class BdptIntegrator final : public Integrator {
     const auto found = [&](Rgb radiance, float pdf_direct, uint32_t emitter) {
       if (is_black(radiance)) return Rgb();
       float others = 0;
-      if (path.state.depth > 0 && (!merging_.alone || left_strand))
+      if (path.state.depth > 0 && (!merge_.is_alone() || left_strand))
         others = h(pdf_direct) * weights.vcm +
                  h(meets ? s_.joined * pdf_emit(context, emitter, path.origin.query.position, path.ray.direction) : 0.0f) * weights.vc;
       return radiance * strategies_.weight(0, path.state.depth + 2, 1.0f / (1.0f + others));
@@ -264,16 +217,16 @@ class BdptIntegrator final : public Integrator {
       const float u_light_choice = sampler.next_1d(), u_lobe = sampler.next_1d();
       const Vec2 u_light = sampler.next_2d(), u = sampler.next_2d();
       const float u_continue = sampler.next_1d(), u_joined = sampler.next_1d();
-      if (may_scatter && !bsdf.is_delta() && merging_.paths > 0 && !on_strand) {
+      if (may_scatter && !bsdf.is_delta() && merge_.is_on() && !on_strand) {
         result.radiance += path.throughput * merge(context, here);
-        if (merging_.alone) bsdf.choose(kSpecular | kTransparent, point.wo);
+        if (merge_.is_alone()) bsdf.choose(kSpecular | kTransparent, point.wo);
       }
-      if (may_scatter && !bsdf.is_delta() && (!merging_.alone || on_strand)) {
+      if (may_scatter && !bsdf.is_delta() && (!merge_.is_alone() || on_strand)) {
         add(direct_light(context, here, u_light_choice, u_light), path.state.depth + 1);
         const auto join = [&](uint32_t k, float times, float u_left) {
           add(connect(context, here, light.vertices[k], u_left) / (times * float(light.counts[group])), path.state.depth + 2);
         };
-        if (path.state.depth < s_.limits.total && !merging_.alone)
+        if (path.state.depth < s_.limits.total && !merge_.is_alone())
           light.choices[group].draw(point.position, bsdf.geometric_normal(), bsdf.flags() & kTransmission, connections_, u_joined, join);
       }
 
@@ -387,7 +340,7 @@ class BdptIntegrator final : public Integrator {
   Rgb merge(const RenderContext& context, const EyeVertex& z) const {
     const Heuristic h = s_.heuristic;
     const Vec3 position = z.point.position;
-    const float radius = radius_ * s_.footprint(position);
+    const float radius = merge_.radius() * s_.footprint(position);
     struct Merged {
       Rgb light;
       bool is_direct;
@@ -396,7 +349,7 @@ class BdptIntegrator final : public Integrator {
     static thread_local std::vector<Vec3> places;
     merged.clear(), places.clear();
     float weighed = 0.0f, all = 0.0f;
-    photons_.near(position, z.point.ng, radius, [&](const MergeVertex& y, Vec3 place, Rgb power_per_area) {
+    merge_.near(position, z.point.ng, radius, [&](const MergeVertex& y, Vec3 place, Rgb power_per_area) {
       const Vec3 wi = y.wi.unpack();
       BounceCount bounces = y.bounces();
       bounces.add(bounces_of(z.state));
@@ -406,7 +359,7 @@ class BdptIntegrator final : public Integrator {
       const float cosine = abs_dot(y.normal.unpack(), wi);
       if (is_black(e.value) || !(cosine > 1e-4f)) return;
       float weight = 1.0f;
-      if (!merging_.alone) {  // [Georgiev 2012, eq. 37 to 39]
+      if (!merge_.is_alone()) {  // [Georgiev 2012, eq. 37 to 39]
         const float pdf_reverse = z.weights.vc > 0.0f ? reverse(context, z, wi).pdf_dir : 0.0f;
         const float others = y.weights.vcm + h(e.pdf_dir) * y.weights.vc + z.weights.vcm + h(pdf_reverse) * z.weights.vc;
         weight = z.merged / (z.merged + others);
@@ -486,16 +439,12 @@ class BdptIntegrator final : public Integrator {
   SubpathSettings s_;
   int connections_;
   Strategies strategies_;
-  Merging merging_;
+  LightMerge merge_;
   int min_bounces_;
   float clamp_direct_, clamp_indirect_;
   EmissionGuide aim_;
   Trials trials_;                    // of light subpaths, by what the lens saw of them
   std::vector<Trials> tile_trials_;  // of the pass
-  EmissionLearner photon_aim_;
-  SeenPoints seen_;
-  LightMerge photons_;
-  float radius_ = 0;  // within which they are merged in this pass, pixels
 };
 
 using Kind = Parameter::Kind;
@@ -544,7 +493,7 @@ const Descriptor& bdpt_descriptor() {
           {"weighted", "Weighted", Kind::kBool, 1, 0, 1, "Off: every way counts in full, to look at one of them alone"},
       }),
       [](const Parameters& p) -> std::unique_ptr<Integrator> {
-        return std::make_unique<BdptIntegrator>(p, Strategies{p.integer("only_s"), p.integer("only_t"), p.on("weighted")}, Merging{});
+        return std::make_unique<BdptIntegrator>(p, Strategies{p.integer("only_s"), p.integer("only_t"), p.on("weighted")}, MergeSettings{});
       },
       /*bakes=*/false,
       /*kept_version=*/0,
@@ -583,7 +532,7 @@ const Descriptor& vcm_descriptor() {
       }),
       [](const Parameters& p) -> std::unique_ptr<Integrator> {
         const int terms = p.integer("terms");
-        const Merging merging{terms == 1 ? 0 : p.integer("photons"), p.real("radius"), p.number("alpha"), terms == 2};
+        const MergeSettings merging{terms == 1 ? 0 : p.integer("photons"), p.real("radius"), p.number("alpha"), terms == 2};
         return std::make_unique<BdptIntegrator>(p, Strategies{-1, -1, true}, merging);
       },
       /*bakes=*/false,

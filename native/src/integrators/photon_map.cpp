@@ -7,91 +7,13 @@
 #include "integrators/integrator.h"
 #include "transport/diffuse_end.h"
 #include "transport/irradiance_records.h"
+#include "transport/photon_irradiance.h"
 
 namespace gi {
 namespace {
 
-// Whether what has gone on since `began` has had its part of the time limit.
-bool is_late(const RenderContext& context, double began) {
-  constexpr double kTimeShare = 0.15;  // each map's, and that of what is read from them
-  return context.time_limit > 0.0 && context.seconds() - began > kTimeShare * context.time_limit;
-}
-
-// What eye rays are when they come from gathering.
-PathState gathering() {
-  PathState eye;
-  eye.depth = eye.diffuse_depth = 1;
-  return eye;
-}
-
-// Irradiance where gathering rays end, looked up by the nearest. [Christensen 1999, "Faster photon map global illumination"] has it at
-// photons, but these lie where it is bright: what is dark would be read as what is bright beside it.
-class IrradianceMap {
- public:
-  // Adds those of `places` whose neighbourhood is not known yet.
-  void cover(const std::vector<PathEnd>& places, const PhotonMap& map, size_t count, float radius, const RenderContext& context) {
-    look_up_by(count, radius);
-    const double began = context.seconds();
-    std::vector<Record> records = records_;
-    std::vector<Vec3> positions;
-    for (size_t k = 0; k < records.size(); ++k) positions.push_back(tree_.point(uint32_t(k)));
-    for (const PathEnd& p : places) {
-      if (nearest(p.position, p.normal)) continue;
-      positions.push_back(p.position), records.push_back({p.normal, Rgb(), 0.0f});
-    }
-    tree_ = PointTree(positions, context.pool);
-    records_.clear();
-    for (const uint32_t k : tree_.order()) records_.push_back(records[k]);
-    constexpr size_t kBatch = 256;
-    context.pool.for_each(int((records_.size() + kBatch - 1) / kBatch), context.cancelled, [&](int b) {
-      for (size_t k = size_t(b) * kBatch; k < std::min((size_t(b) + 1) * kBatch, records_.size()); ++k) {
-        Record& r = records_[k];
-        if (r.reach > 0.0f || is_late(context, began)) continue;
-        r.irradiance = map.irradiance(tree_.point(uint32_t(k)), r.normal, radius_, count, kEye, &context.scene, &r.reach);
-      }
-    });
-  }
-  // What no record is near is looked up among the nearest `count` photons within `radius`.
-  void look_up_by(size_t count, float radius) { count_ = count, radius_ = radius; }
-
-  // Power per square metre on the side of `normal`; nothing if photons are from farther about than `distance`, which is how far it is
-  // seen from: from there it would show as a blot. [Jensen 2001, §9.3.4]
-  std::optional<Rgb> at(const PhotonMap& map, const Scene& scene, Vec3 position, Vec3 normal, float distance) const {
-    float reach = 0.0f;
-    Rgb found;
-    if (const Record* r = nearest(position, normal))
-      found = r->irradiance, reach = r->reach;
-    else
-      found = map.irradiance(position, normal, radius_, count_, kEye, &scene, &reach);
-    return reach > distance ? std::nullopt : std::optional(found);
-  }
-  size_t memory_bytes() const { return records_.size() * sizeof(Record) + tree_.memory_bytes(); }
-
- private:
-  static inline const PathState kEye = gathering();
-  struct Record {
-    Vec3 normal;
-    Rgb irradiance;
-    float reach = 0;  // its photons are in this radius; 0: not worked out
-  };
-
-  // The record that a place is read from; null: none is near enough.
-  const Record* nearest(Vec3 position, Vec3 normal) const {
-    constexpr float kSlope = 0.9f, kThickness = 0.5f;
-    float best = sqr(radius_);
-    uint32_t nearest = kNoId;
-    tree_.within(position, best, [&](uint32_t k, float d2) {
-      if (dot(records_[k].normal, normal) < kSlope || sqr(dot(tree_.point(k) - position, normal)) > sqr(kThickness) * d2) return;
-      if (d2 < best || k < nearest) best = d2, nearest = k;
-    });
-    return nearest != kNoId && best <= sqr(records_[nearest].reach) && records_[nearest].reach > 0.0f ? &records_[nearest] : nullptr;
-  }
-
-  std::vector<Record> records_;  // in the order of the tree
-  PointTree tree_;
-  size_t count_ = 0;
-  float radius_ = 0;
-};
+// The share of a time limit that each map gets.
+constexpr double kTimeShare = 0.15;
 
 // A radius that `count` photons lie well within, at most of the places.
 float typical_spread(const PhotonMap& map, const std::vector<PathEnd>& places, size_t count) {
@@ -272,7 +194,8 @@ class PhotonMapIntegrator final : public Integrator {
     const double traced = context.seconds();
     context.log.stage("irradiance by photons");
     if (gathers() && !glances)
-      irradiance_.cover(find_ends(context, film, s_.limits, true, kRecordsAcross), global_.map, global_.count, global_.reach, context);
+      irradiance_.cover(find_ends(context, film, s_.limits, true, kRecordsAcross), global_.map, global_.count, global_.reach, context,
+                        kTimeShare);
     context.log.stage("");
     built_ = !context.cancelled;
     const size_t bytes = global_.map.memory_bytes() + caustic_.map.memory_bytes();
@@ -309,7 +232,7 @@ class PhotonMapIntegrator final : public Integrator {
     const bool was_complete = stock.is_complete();
     if (stock.loose.empty() && !was_complete) stock.loose = stock.map.photons();
     const int batch = (paths + kBatches - 1) / kBatches;
-    while (stock.batches < kBatches && !(stock.batches > 0 && is_late(context, began))) {
+    while (stock.batches < kBatches && !(stock.batches > 0 && context.has_had(kTimeShare, began))) {
       if (!trace(stock.batches, batch)) return;
       stock.paths = double(++stock.batches) * batch;
     }

@@ -18,14 +18,24 @@ struct MergeVertex {
   BounceCount bounces() const { return {total, diffuse, glossy, transmission}; }
 };
 
+// Which vertices are merged: those of a pass's own light paths, within a radius that shrinks from pass to pass.
+struct MergeSettings {
+  int paths = 0;  // at most, and no more than pixels; 0: none
+  float radius = 0;  // in the first pass, pixels
+  double alpha = 1;
+  bool alone = false;  // nothing else: photon mapping
+};
+
 class LightMerge {
  public:
-  LightMerge() = default;
-  LightMerge(const RenderContext& context, const SubpathSettings& settings, int pass, int paths);
+  explicit LightMerge(const MergeSettings& settings) : settings_(settings) {}
+  bool is_on() const { return settings_.paths > 0; }
+  bool is_alone() const { return settings_.alone; }
+  float radius() const { return radius_; }  // of this pass, pixels
 
-  size_t size() const { return vertices_.size(); }
-  size_t memory_bytes() const { return vertices_.capacity() * sizeof(MergeVertex) + tree_.memory_bytes(); }
-  int paths() const { return paths_; }
+  // Sets the radius, and what merging weighs by it (`subpaths.merges`), and sends out what eye vertices of this pass will be merged with.
+  // These paths are not those that are joined, so there may be as many as wished; they aim at what is seen and other ways leave to them.
+  void begin_pass(const RenderContext& context, int pass, const Film& film, SubpathSettings& subpaths);
 
   // Calls f(vertex, its place, irradiance of that vertex if it is spread over the disc) for those on the surface around `position`.
   template <class F>
@@ -40,9 +50,16 @@ class LightMerge {
   }
 
  private:
-  std::vector<MergeVertex> vertices_;  // in the order of the tree
-  PointTree tree_;
+  void learn(const RenderContext& context, int pass, const Film& film, const SubpathSettings& subpaths);
+  void send(const RenderContext& context, int pass, const SubpathSettings& subpaths);
+
+  MergeSettings settings_;
+  float radius_ = 0;
   int paths_ = 0;
+  EmissionLearner aim_;
+  SeenPoints seen_;
+  std::vector<MergeVertex> vertices_;  // of this pass, in the order of the tree
+  PointTree tree_;
 };
 
 }  // namespace gi

@@ -87,7 +87,7 @@ EmissionGuide learn_emission(const RenderContext& context, const SubpathSettings
     }
     if (round >= EmissionLearner::kFirstRounds && learner.size() > kEnough && (!shows_way || tried >= photons / 2)) break;
     if (arrived == 0 && tried >= photons / 2) break;
-    if (context.time_limit > 0.0 && context.seconds() - began > kTimeShare * context.time_limit) break;
+    if (context.has_had(kTimeShare, began)) break;
     const int trials = std::min(photons / 8, kFirstRound << round);
     tried += trials;
     learner.learn(context, settings, trials, [&](const LightVertices& path, Sampler&) {

@@ -82,6 +82,8 @@ struct RenderContext {
   bool steady = false;                 // a frame among others: what it takes over stays as it is
 
   double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); }
+  // Whether what has gone on since `began` has had this share of a time limit.
+  bool has_had(double share, double began) const { return time_limit > 0.0 && seconds() - began > share * time_limit; }
 };
 
 }  // namespace gi
