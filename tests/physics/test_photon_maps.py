@@ -184,6 +184,16 @@ def test_beside_a_wall_only_photons_before_it_count(way):
     assert abs(found_dark - dark) < 4 * error_dark + 0.02 * bright
 
 
+def test_what_is_behind_a_wall_is_left_out_and_not_taken_away():
+    """No pixel of a first pass on the dark side is below 0."""
+    sheet = quad((0, -1, -1), (0, 1, -1), (0, 1, 1), (0, -1, 1))
+    light = lamp("POINT", (100.0,) * 3, matrix=matrix((0.5, 0, 0)))
+    scene = scene_of((cube(), surface(0.5)), (sheet, surface(0.5)), lights=[light])
+    image = render("vcm", scene, (-0.05, 0.1, 0), (0, 0, -1), 0.2, 1, 64, radius=20)[0]
+    assert image.min() >= 0
+    assert image.max() > 0  # a little comes through all the same
+
+
 def test_the_caustic_of_a_lens_is_that_of_light_tracing():
     """Under a glass ball, in rings about the focus: light tracing needs no density estimate."""
     floor = quad((-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1))

@@ -368,7 +368,7 @@ class BdptIntegrator final : public Integrator {
       weighed += average(light) * weight, all += average(light);
       merged.push_back({light * weight, y.is_first && z.state.depth == 0}), places.push_back(place);
     });
-    // Looking about costs as much as a few connections: what other ways do better is seldom worth it, nor are few vertices, noisy as they
+    // Looking down costs as much as a few connections: what other ways do better is seldom worth it, nor are few vertices, noisy as they
     // are.
     const float chance = std::min(1.0f, 4.0f * safe_divide(weighed, all)) * std::clamp(float(places.size()) / 16.0f, 0.25f, 1.0f);
     const std::vector<float>& counts = counts_in_sight(context.scene, position, z.point.ng, radius, places, chance);

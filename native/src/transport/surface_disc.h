@@ -49,25 +49,24 @@ class SurfaceDisc {
     return dot(wall.normal, place) <= wall.distance;
   }
 
-  // The share that is surface and in sight, by chance: rays fall all over what is in sight.
-  float share() const {
-    constexpr int kRings = 2;
+  // The share that is in sight; and that is surface, too, by rays that fall all over what is in sight.
+  float share_in_sight() const {
     float sum = 0.0f;
-    for (int k = 0; k < kSectors; ++k) {
-      for (int ring = 0; ring < kRings; ++ring) {
-        const uint32_t place = uint32_t(1 + 2 * (k * kRings + ring));
-        const Vec2 along = direction(float(k) + number(place + 1));
-        const float reach = walls_[size_t(k)].reach(along, radius_);
-        const float distance = reach * std::sqrt((float(ring) + number(place)) / kRings);
-        const auto ground = look(eye_ + to_world(along) * distance, -frame_.z, height_ + kSurfaceSlope * radius_);
-        if (ground && is_on_surface(*ground - height_, distance, radius_)) sum += sqr(reach / radius_) / float(kSectors * kRings);
-      }
-    }
-    return std::max(sum, 0.5f / float(kSectors * kRings));
+    for_each_place([&](Vec2, float, float part) { sum += part; });
+    return std::max(sum, kLeastShare);
+  }
+  float share() const {
+    float sum = 0.0f;
+    for_each_place([&](Vec2 along, float distance, float part) {
+      const auto ground = look(eye_ + to_world(along) * distance, -frame_.z, height_ + kSurfaceSlope * radius_);
+      if (ground && is_on_surface(*ground - height_, distance, radius_)) sum += part;
+    });
+    return std::max(sum, kLeastShare);
   }
 
  private:
-  static constexpr int kSectors = 8;
+  static constexpr int kSectors = 8, kRings = 2;
+  static constexpr float kLeastShare = 0.5f / float(kSectors * kRings);
 
   // What ends the sight in a sector, as the straight line in the plane that it would be if it were flat; none: far away.
   struct Wall {
@@ -90,6 +89,19 @@ class SurfaceDisc {
     constexpr float kLeast = 0.1f;  // where it is nearly level, or seen edgewise, it ends the sight at a right angle
     if (!(size > kLeast && dot(normal, along) > kLeast)) return {along, hit->t};
     return {normal, hit->t * dot(normal, along)};
+  }
+
+  // Calls f(direction, distance, part of the disc that it stands for) for places by chance in each ring of each sector.
+  template <class F>
+  void for_each_place(const F& f) const {
+    for (int k = 0; k < kSectors; ++k) {
+      for (int ring = 0; ring < kRings; ++ring) {
+        const uint32_t place = uint32_t(1 + 2 * (k * kRings + ring));
+        const Vec2 along = direction(float(k) + number(place + 1));
+        const float reach = walls_[size_t(k)].reach(along, radius_);
+        f(along, reach * std::sqrt((float(ring) + number(place)) / kRings), sqr(reach / radius_) / float(kSectors * kRings));
+      }
+    }
   }
 
   float number(uint32_t k) const { return to_unit_float(hash_combine(key_, k)); }
@@ -130,8 +142,9 @@ inline bool is_even(const std::vector<Vec2>& points, float radius_squared) {
   return sqr(mean.x) + sqr(mean.y) < sqr(kShift * n) * radius_squared && least > kSpread * n * radius_squared;
 }
 
-// Of each of the points in a disc (`places` in a frame about its middle), what it counts where all of the disc would count 1: nothing where
-// it is out of sight, more where not all is seen. Where they lie evenly no ray is sent. Looks with probability `chance`; right on average.
+// Of each of the points in a disc, what it counts where all of the disc would count 1: nothing where it is out of sight, more where not all
+// is seen or is surface. Where they lie evenly no ray is sent. Whether it is surface is looked at with probability `chance`; right on
+// average.
 inline const std::vector<float>& counts_in_sight(const Scene& scene, Vec3 position, Vec3 normal, float radius,
                                                  const std::vector<Vec3>& points, float chance = 1.0f) {
   static thread_local std::vector<Vec2> places;
@@ -146,13 +159,10 @@ inline const std::vector<float>& counts_in_sight(const Scene& scene, Vec3 positi
   }
   if (is_even(places, sqr(radius))) return counts;
   constexpr uint32_t kStream = 0x6c6f6f6bu;
-  if (!(to_unit_float(hash_combine(SurfaceDisc::key_of(position), kStream)) < chance)) return counts;
+  const bool looks = to_unit_float(hash_combine(SurfaceDisc::key_of(position), kStream)) < chance;
   const SurfaceDisc disc(scene, position, normal, radius);
-  const float seen = 1.0f / disc.share();
-  for (size_t k = 0; k < points.size(); ++k) {
-    const float count = disc.sees(disc.place(points[k])) ? seen : 0.0f;
-    counts[k] = 1.0f + (count - 1.0f) / chance;
-  }
+  const float in_sight = disc.share_in_sight(), all = looks ? 1.0f + (in_sight / disc.share() - 1.0f) / chance : 1.0f;
+  for (size_t k = 0; k < points.size(); ++k) counts[k] = disc.sees(disc.place(points[k])) ? all / in_sight : 0.0f;
   return counts;
 }
 
