@@ -2,7 +2,8 @@
 
     python bench/photons.py [--threads N]
 
-Writes bench/results/photons.md. Sending is measured in a Cornell box with a glass and a mirror ball (examples/jensen_box.blend)."""
+Writes bench/results/photons.md. Sending is measured in the Cornell box (examples/cornell.blend), and in one with a glass and a mirror ball
+(examples/jensen_box.blend)."""
 
 import argparse
 import os
@@ -19,27 +20,28 @@ from gi_engine.session import Session
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULT = ROOT / "bench" / "results" / "photons.md"
-ROUNDS = 3
+SCENES = "cornell", "jensen_box"
+ROUNDS = 7
 PATHS = 540_000  # which leave about a million photons
 
 
-def jensen_box():
-    gi_engine.register()
-    bpy.ops.wm.open_mainfile(filepath=str(ROOT / "examples" / "jensen_box.blend"), load_ui=False)
+def exported(name: str):
+    bpy.ops.wm.open_mainfile(filepath=str(ROOT / "examples" / f"{name}.blend"), load_ui=False)
     scene = bpy.context.scene
     scene.render.engine = "GI_ENGINE"
     depsgraph = bpy.context.evaluated_depsgraph_get()
     return export(depsgraph, native.integrators(), None, (8, 8))
 
 
-def sent(exported, threads: int, count: int) -> dict:
+def sent(name: str, threads: int, count: int) -> dict:
     """Figures of a map of all photons that `count` light paths leave, as final gathering reads it; the median run."""
-    settings = exported.settings
+    sending = exported(name)
+    settings = sending.settings
     settings.integrator, settings.samples, settings.threads = "photon_map", 1, threads
     settings.parameters = {"global_photons": count, "caustic_photons": 1, "global_light": "GATHERED"}
     runs = []
     for _ in range(ROUNDS):
-        with Session(exported.scene, settings) as session:
+        with Session(sending.scene, settings) as session:
             while not session.wait():
                 pass
             runs.append(session.native.figures())
@@ -60,19 +62,28 @@ def found(count: int, neighbours: int) -> tuple[float, float]:
     return built, (time.perf_counter() - start) / len(places) * 1e6
 
 
+def row(name: str, figures: dict) -> str:
+    photons = figures["global photons"]
+    whole, traced, settled = (figures[f"photon {part}seconds"] * 1e6 / photons for part in ("", "tracing ", "tree "))
+    return f"| {name} | {traced:.2f} | {settled:.2f} | {whole - traced - settled:.2f} | {whole:.2f} | {figures['photon bytes'] / photons:.1f} |"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--threads", type=int, default=1)
     options = parser.parse_args()
-    figures = sent(jensen_box(), options.threads, PATHS)
-    photons = figures["global photons"]
+    gi_engine.register()
     built, query = sorted(found(1_000_000, 50) for _ in range(ROUNDS))[ROUNDS // 2]
     lines = [
-        "# Photons\n",
-        f"- {photons:,.0f} photons of {PATHS:,} light paths aimed, sent, stored and made a tree of, {options.threads} thread: "
-        f"{figures['photon seconds']:.2f} s; {1e6 * figures['photon seconds'] / photons:.2f} s for a million",
-        f"- memory: {figures['photon bytes'] / photons:.1f} bytes a photon, its part of the tree included",
-        f"- a tree of 1,000,000 points: {built:.2f} s; the nearest 50: {query:.1f} us",
+        f"# Photons\n\nOf a million photons, with {options.threads} thread (of {PATHS:,} light paths, about as many):\n"
+    ]
+    lines += [
+        "| scene | sent and stored, s | made a tree of, s | aimed, s | in all, s | bytes a photon |",
+        "|" + "---|" * 6,
+    ]
+    lines += [row(name, sent(name, options.threads, PATHS)) for name in SCENES]
+    lines += [
+        f"\n- a tree of 1,000,000 points: {built:.2f} s; the nearest 50: {query:.1f} us",
     ]
     RESULT.write_text("\n".join(lines) + "\n")
     print(*lines, sep="\n", flush=True)

@@ -41,10 +41,8 @@ void select(Item* first, Item* middle, Item* last) {
 
 }  // namespace
 
-PointTree::PointTree(const std::vector<Vec3>& points, ThreadPool& pool) {
-  const size_t n = points.size();
-  std::vector<Item> items(n);
-  for (size_t i = 0; i < n; ++i) items[i] = {points[i], uint32_t(i)};
+void PointTree::build(LargeVector<Item>& items, ThreadPool& pool) {
+  const size_t n = items.size();
   size_t nodes = 0;  // levels are full but for the last
   for (size_t level = 1, largest = n; largest > kLeaf; largest -= largest / 2, level *= 2) nodes += level;
   nodes_.resize(nodes);
@@ -63,13 +61,13 @@ PointTree::PointTree(const std::vector<Vec3>& points, ThreadPool& pool) {
     level = std::move(next);
   }
   const size_t first = level.size() - 1;
-  pool.for_each(int(level.size()), never, [&](int i) { build(items, first + size_t(i), level[size_t(i)]); });
+  pool.for_each(int(level.size()), never, [&](int i) { build_below(items, first + size_t(i), level[size_t(i)]); });
 
   x_.resize(n), y_.resize(n), z_.resize(n), order_.resize(n);
   for (size_t i = 0; i < n; ++i) x_[i] = items[i].point.x, y_[i] = items[i].point.y, z_[i] = items[i].point.z, order_[i] = items[i].index;
 }
 
-void PointTree::split(std::vector<Item>& items, size_t node, Range range) {
+void PointTree::split(LargeVector<Item>& items, size_t node, Range range) {
   Vec3 low = items[range.begin].point, high = low;
   for (size_t i = range.begin; i < range.end; ++i) low = min(low, items[i].point), high = max(high, items[i].point);
   const Vec3 extent = high - low;
@@ -80,11 +78,11 @@ void PointTree::split(std::vector<Item>& items, size_t node, Range range) {
   nodes_[node] = {middle->point[axis], uint32_t(axis)};
 }
 
-void PointTree::build(std::vector<Item>& items, size_t node, Range range) {
+void PointTree::build_below(LargeVector<Item>& items, size_t node, Range range) {
   if (range.is_leaf()) return;
   split(items, node, range);
-  build(items, 2 * node + 1, range.low());
-  build(items, 2 * node + 2, range.high());
+  build_below(items, 2 * node + 1, range.low());
+  build_below(items, 2 * node + 2, range.high());
 }
 
 }  // namespace gi

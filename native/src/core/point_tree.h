@@ -3,6 +3,7 @@
 #pragma once
 #include <vector>
 
+#include "core/large_vector.h"
 #include "core/parallel.h"
 #include "core/vec.h"
 
@@ -12,11 +13,19 @@ class PointTree {
  public:
   PointTree() = default;
   // The tree does not depend on the number of threads.
-  PointTree(const std::vector<Vec3>& points, ThreadPool& pool);
+  PointTree(const std::vector<Vec3>& points, ThreadPool& pool) : PointTree(points, [](Vec3 p) { return p; }, pool) {}
+  // Of position(thing) of all `things`.
+  template <class Things, class Position>
+  PointTree(const Things& things, const Position& position, ThreadPool& pool) {
+    LargeVector<Item> items;
+    items.reserve(things.size());
+    for (const auto& thing : things) items.push_back({position(thing), uint32_t(items.size())});
+    build(items, pool);
+  }
 
   size_t size() const { return order_.size(); }
   // Points are known by their place in the tree; order()[k] is that among those given.
-  const std::vector<uint32_t>& order() const { return order_; }
+  const LargeVector<uint32_t>& order() const { return order_; }
   Vec3 point(uint32_t k) const { return {x_[k], y_[k], z_[k]}; }
   size_t memory_bytes() const { return nodes_.size() * sizeof(Node) + size() * (3 * sizeof(float) + sizeof(uint32_t)); }
 
@@ -53,12 +62,13 @@ class PointTree {
     Vec3 point;
     uint32_t index;
   };
-  void split(std::vector<Item>& items, size_t node, Range range);
-  void build(std::vector<Item>& items, size_t node, Range range);
+  void build(LargeVector<Item>& items, ThreadPool& pool);
+  void build_below(LargeVector<Item>& items, size_t node, Range range);
+  void split(LargeVector<Item>& items, size_t node, Range range);
 
-  std::vector<Node> nodes_;  // of node i the children are 2i + 1 and 2i + 2
-  std::vector<float> x_, y_, z_;
-  std::vector<uint32_t> order_;
+  LargeVector<Node> nodes_;  // of node i the children are 2i + 1 and 2i + 2
+  LargeVector<float> x_, y_, z_;
+  LargeVector<uint32_t> order_;
 };
 
 template <class F>

@@ -35,13 +35,16 @@ struct Stock {
   size_t count = 0;  // neighbours
   float reach = 0;  // farther away they are not looked for
   int batches = 0;  // sent of those that are wanted at least
-  std::vector<Photon> loose = {};  // of all batches, where the map does not have them all yet
+  LargeVector<Photon> loose = {};  // of all batches, where the map does not have them all yet
+  double seconds_traced = 0, seconds_settled = 0;
 
   bool is_complete() const { return batches >= kBatches && loose.empty(); }
   bool is_begun() const { return batches > 0; }
-  void settle(ThreadPool& pool) {
-    map = PhotonMap(loose, paths, pool);
-    loose.clear();
+  void settle(const RenderContext& context) {
+    const double start = context.seconds();
+    map = PhotonMap(loose, paths, context.pool);
+    LargeVector<Photon>().swap(loose);
+    seconds_settled += context.seconds() - start;
   }
   KeptTable keep() const;
 };
@@ -202,13 +205,15 @@ class PhotonMapIntegrator final : public Integrator {
     context.log.set("global photons", double(global_.map.size()));
     context.log.set("caustic photons", double(caustic_.map.size()));
     context.log.set("photon seconds", traced - start);
+    context.log.set("photon tracing seconds", global_.seconds_traced + caustic_.seconds_traced);
+    context.log.set("photon tree seconds", global_.seconds_settled + caustic_.seconds_settled);
     context.log.set("photon bytes", double(bytes));
     context.log.say(std::to_string(global_.map.size()) + " global and " + std::to_string(caustic_.map.size()) + " caustic photons, " +
                     std::to_string((bytes + irradiance_.memory_bytes()) >> 20) + " MiB");
   }
 
   void glance(const RenderContext& context, const Film& film, bool gathered, size_t count, Stock& stock) const {
-    if (stock.map.size() == 0 && !stock.loose.empty()) stock.settle(context.pool);
+    if (stock.map.size() == 0 && !stock.loose.empty()) stock.settle(context);
     if (stock.count == 0) come_to_neighbours(stock, find_ends(context, film, s_.limits, gathered, kLooksAcross), count);
   }
 
@@ -223,10 +228,12 @@ class PhotonMapIntegrator final : public Integrator {
     const auto trace = [&](int batch, int size) {
       if (!guide) guide = learn_emission(context, light, paths, classes, seen);
       light.guide = &*guide;
-      const std::vector<Photon> more = trace_photons(context, light, batch, size, classes);
-      if (stock.loose.empty()) stock.loose.reserve(size_t(1.02 * kBatches * double(more.size())));  // about as many as there will be
-      if (context.cancelled) return false;
-      stock.loose.insert(stock.loose.end(), more.begin(), more.end());
+      const double start = context.seconds();
+      const size_t before = stock.loose.size();
+      trace_photons(context, light, batch, size, classes, stock.loose);
+      if (before == 0) stock.loose.reserve(size_t(1.02 * kBatches * double(stock.loose.size())));  // about as many as there will be
+      if (context.cancelled) return stock.loose.resize(before), false;
+      stock.seconds_traced += context.seconds() - start;
       return true;
     };
     const bool was_complete = stock.is_complete();
@@ -236,7 +243,7 @@ class PhotonMapIntegrator final : public Integrator {
       if (!trace(stock.batches, batch)) return;
       stock.paths = double(++stock.batches) * batch;
     }
-    if (!was_complete) stock.settle(context.pool);
+    if (!was_complete) stock.settle(context);
     if (stock.batches < kBatches)
       context.log.say(name + " photons: time for " + std::to_string(stock.batches * batch) + " of " + std::to_string(paths) +
                       " light paths");
@@ -260,7 +267,7 @@ class PhotonMapIntegrator final : public Integrator {
       stock.loose = stock.map.photons();
       if (!trace(1, int(stock.paths))) return stock.loose.clear();  // those of before are in the map
       stock.paths *= 2.0;
-      stock.settle(context.pool);
+      stock.settle(context);
     }
   }
 
@@ -325,7 +332,7 @@ class PhotonMapIntegrator final : public Integrator {
 
 // A row for each photon; the first row says how many paths were sent for them.
 KeptTable Stock::keep() const {
-  const std::vector<Photon> all = map.photons();
+  const LargeVector<Photon> all = map.photons();
   KeptTable table{Photon::kNumbers, std::vector<float>((all.size() + 1) * Photon::kNumbers)};
   table.numbers[0] = float(paths);
   for (size_t i = 0; i < all.size(); ++i) all[i].write(&table.numbers[(i + 1) * Photon::kNumbers]);

@@ -26,7 +26,9 @@ class SppmIntegrator final : public Integrator {
       guide_is_old_ = context.cancelled;
     }
     light.guide = &guide_;
-    const PhotonMap map(trace_photons(context, light, pass, photons_, kCausticPhoton | kGlobalPhoton), photons_, context.pool);
+    sent_.clear();
+    trace_photons(context, light, pass, photons_, kCausticPhoton | kGlobalPhoton, sent_);
+    const PhotonMap map(sent_, photons_, context.pool);
     if (context.cancelled) return;
     const float scale = radius_ * float(std::sqrt(shrinking(pass, alpha_)));
     context.log.set("photons", double(map.size()));
@@ -48,6 +50,7 @@ class SppmIntegrator final : public Integrator {
   DiffuseEndSettings s_;
   EmissionGuide guide_;
   bool guide_is_old_ = true;
+  LargeVector<Photon> sent_;  // in this pass
 };
 
 }  // namespace

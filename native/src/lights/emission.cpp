@@ -29,12 +29,10 @@ std::optional<EmittedRay> LightSet::Impl::emit_triangle(uint32_t light, Vec2 u_p
   const Vec3 n = back ? -t.normal() : t.normal();
   const Vec2 b = sample_triangle(u_place);
   const Vec3 direction = Frame::from_normal(n).to_world(sample_cosine_hemisphere(u_direction));
-  ShadingPoint p = scene.surface_point(t.instance, t.triangle, b.x, b.y, direction, seen_by_light({}, 1.0f));
-  EmittedRay r{{p.position, direction}, Rgb(), light, true, scene.instances()[t.instance].data->visibility, b};
-  const float scale = std::max({std::abs(p.position.x), std::abs(p.position.y), std::abs(p.position.z), 1e-2f});
-  r.ray.origin = p.position + n * (scale * 4e-6f);
-  r.power = scene.emission(p) * (kPi * t.area() * sides);
-  return r;
+  const Vec3 place = t.a + b.x * t.ab + b.y * t.ac;
+  const float scale = std::max({std::abs(place.x), std::abs(place.y), std::abs(place.z), 1e-2f});
+  const Rgb power = triangle_emission(t, b, direction, {}, 1.0f) * (kPi * t.area() * sides);
+  return EmittedRay{{place + n * (scale * 4e-6f), direction}, power, light, true, scene.instances()[t.instance].data->visibility, b};
 }
 
 EmittedRay LightSet::Impl::emit_world(Vec2 u_place, Vec2 u_direction) const {
@@ -55,11 +53,11 @@ std::optional<LightSample> LightSet::Impl::arriving_lamp(const EmittedRay& emitt
   return l;
 }
 
-std::optional<LightSample> LightSet::Impl::arriving_triangle(const EmittedRay& emitted, const LightQuery& query) const {
+std::optional<LightSample> LightSet::Impl::arriving_triangle(const EmittedRay& emitted, const LightQuery& query, bool with_pdf) const {
   const TriangleLight& t = triangles[emitted.light - first_triangle()];
   const Vec3 wi = -emitted.ray.direction;
-  const float pdf = t.pdf_dir(query.position, wi);
-  if (!(pdf > 0.0f)) return std::nullopt;
+  const float pdf = with_pdf ? t.pdf_dir(query.position, wi) : 0.0f;
+  if (with_pdf ? !(pdf > 0.0f) : !t.shines_to(query.position)) return std::nullopt;
   const Vec2 b = emitted.barycentrics;
   return triangle_sample(emitted.light, query, {wi, length(t.a + t.ab * b.x + t.ac * b.y - query.position), pdf, b.x, b.y});
 }
@@ -91,7 +89,7 @@ std::optional<LightSample> LightSet::arriving(const EmittedRay& emitted, const L
   const Impl& impl = *impl_;
   const Vec3 wi = -emitted.ray.direction;
   return emitted.light < impl.first_triangle() ? impl.arriving_lamp(emitted, query, with_pdf)
-         : emitted.light < impl.world_light()  ? impl.arriving_triangle(emitted, query)
+         : emitted.light < impl.world_light()  ? impl.arriving_triangle(emitted, query, with_pdf)
                                                : std::optional(impl.world_sample(query, wi, impl.world.pdf_dir(query, wi)));
 }
 

@@ -239,16 +239,17 @@ struct LightSet::Impl {
     if (!t || !(t->pdf_dir > 0.0f)) return std::nullopt;
     return triangle_sample(light, query, *t);
   }
+  // Towards `wo`, as it is seen from so far away.
+  Rgb triangle_emission(const TriangleLight& t, Vec2 barycentrics, Vec3 wo, const PathState& path, float distance) const {
+    if (const auto& constant = scene.material(int(t.material)).program.constant_emission()) return *constant;
+    ShadingPoint p = scene.surface_point(t.instance, t.triangle, barycentrics.x, barycentrics.y, wo, seen_by_light(path, distance));
+    return scene.emission(p);
+  }
   LightSample triangle_sample(uint32_t light, const LightQuery& query, const TriangleSample& t) const {
     const TriangleLight& triangle = triangles[light - first_triangle()];
     LightSample s;
     s.wi = t.wi, s.distance = t.distance, s.pdf_dir = t.pdf_dir, s.light = light;
-    if (const auto& constant = scene.material(int(triangle.material)).program.constant_emission()) {
-      s.radiance = *constant;
-    } else {
-      ShadingPoint p = scene.surface_point(triangle.instance, triangle.triangle, t.b1, t.b2, -t.wi, seen_by_light(query.path, t.distance));
-      s.radiance = scene.emission(p);
-    }
+    s.radiance = triangle_emission(triangle, {t.b1, t.b2}, -t.wi, query.path, t.distance);
     s.visibility = scene.instances()[triangle.instance].data->visibility;
     return s;
   }
@@ -279,7 +280,7 @@ struct LightSet::Impl {
   std::optional<EmittedRay> emit_triangle(uint32_t light, Vec2 u_place, Vec2 u_direction) const;
   EmittedRay emit_world(Vec2 u_place, Vec2 u_direction) const;
   std::optional<LightSample> arriving_lamp(const EmittedRay& emitted, const LightQuery& query, bool with_pdf) const;
-  std::optional<LightSample> arriving_triangle(const EmittedRay& emitted, const LightQuery& query) const;
+  std::optional<LightSample> arriving_triangle(const EmittedRay& emitted, const LightQuery& query, bool with_pdf) const;
 
   std::optional<float> meet(uint32_t index, const Ray& ray, uint32_t visibility) const {
     const Lamp& lamp = lamps[index];

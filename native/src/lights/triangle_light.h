@@ -16,8 +16,9 @@ struct TriangleLight {
   uint32_t instance = 0, triangle = 0;
   uint32_t material = 0;
   bool front = true, back = true;  // which sides are sampled; front is where ab × ac points
-  Vec3 n;           // ab × ac
-  float edge2 = 0;  // longest, squared
+  Vec3 n;                // ab × ac
+  float twice_area = 0;  // its length
+  float edge2 = 0;       // longest, squared
 
   TriangleLight() = default;
   explicit TriangleLight(const Vec3 v[3])
@@ -25,10 +26,11 @@ struct TriangleLight {
         ab(v[1] - v[0]),
         ac(v[2] - v[0]),
         n(cross(ab, ac)),
+        twice_area(length(n)),
         edge2(std::max({length_squared(ab), length_squared(ac), length_squared(ac - ab)})) {}
 
   Vec3 normal() const { return normalize(n); }
-  float area() const { return 0.5f * length(n); }
+  float area() const { return 0.5f * twice_area; }
 
   std::optional<TriangleSample> sample(Vec3 position, Vec2 u) const {
     if (!shines_to(position)) return std::nullopt;
@@ -48,7 +50,7 @@ struct TriangleLight {
       const Corners c(*this, position);
       if (c.by_angle) return 1.0f / c.solid_angle;
     }
-    const float twice_area = length(n), across = dot(wi, n);
+    const float across = dot(wi, n);
     if (across == 0.0f) return 0.0f;
     const float distance = std::abs(dot(a - position, n) / across);
     return pdf_area_to_dir(2.0f / twice_area, distance, std::abs(across) / twice_area);
@@ -63,7 +65,7 @@ struct TriangleLight {
   // Whether it fills so much of the view that 1/cos and 1/d² change across it.
   bool is_near(Vec3 position) const {
     const Vec3 to = a - position;
-    return sqr(dot(to, n)) < edge2 * length_squared(n) && length_squared(to) < sqr(kFar) * edge2;
+    return sqr(dot(to, n)) < edge2 * sqr(twice_area) && length_squared(to) < sqr(kFar) * edge2;
   }
 
   struct Corners {
@@ -81,7 +83,7 @@ struct TriangleLight {
   std::optional<TriangleSample> sample_by_area(Vec3 position, Vec2 u) const {
     const Vec2 b = sample_triangle(u);
     const Vec3 to = a + ab * b.x + ac * b.y - position;
-    const float distance = length(to), twice_area = length(n);
+    const float distance = length(to);
     if (!(distance > 0.0f)) return std::nullopt;
     const Vec3 wi = to / distance;
     const float pdf = pdf_area_to_dir(2.0f / twice_area, distance, abs_dot(wi, n) / twice_area);

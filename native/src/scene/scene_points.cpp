@@ -70,11 +70,11 @@ ShadingPoint Scene::surface_point(uint32_t instance, uint32_t triangle, float b1
 }
 
 ShadingPoint Scene::shading_point(const Ray& ray, const Hit& hit, const PathState& path, float footprint) const {
-  PathState arrived = path;
-  arrived.ray_length = hit.t;
-  if (strands_[instances_[hit.instance].mesh])
-    return strand_point(hit, ray.origin + ray.direction * hit.t, -ray.direction, arrived, footprint);
-  return surface_point(hit.instance, hit.triangle, hit.b1, hit.b2, -ray.direction, arrived, footprint);
+  ShadingPoint p = strands_[instances_[hit.instance].mesh]
+                       ? strand_point(hit, ray.origin + ray.direction * hit.t, -ray.direction, path, footprint)
+                       : surface_point(hit.instance, hit.triangle, hit.b1, hit.b2, -ray.direction, path, footprint);
+  p.path.ray_length = hit.t;
+  return p;
 }
 
 Vec3 Scene::shadow_origin(const ShadingPoint& point, Vec3 wi) const {

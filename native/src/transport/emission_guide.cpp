@@ -24,6 +24,7 @@ constexpr int kMostHalvings = 12;    // of one axis
 struct EmissionGuide::Builder {
   std::vector<Node>& nodes;
   double whole, even;
+  std::vector<double> mass = {0.0};  // of each node
 
   struct Box {
     EmissionNumbers low{};
@@ -33,7 +34,7 @@ struct EmissionGuide::Builder {
   };
 
   void grow(uint32_t index, std::span<Trial> trials, const Box& box, double worth) {
-    nodes[index].mass = std::sqrt(worth * box.volume);
+    mass[index] = std::sqrt(worth * box.volume);
     double sum = 0, squares = 0, bins[kEmissionAxes][kBins] = {};
     for (const Trial& t : trials) {
       sum += double(t.worth), squares += double(t.worth) * double(t.worth);
@@ -51,7 +52,7 @@ struct EmissionGuide::Builder {
       for (const double b : bins[a]) divided += std::sqrt(b / sum / kBins);
       if (1.0 - divided > most) most = 1.0 - divided, best = a;
     }
-    if (best < 0 || most * nodes[index].mass < kLeastGain * whole) return;
+    if (best < 0 || most * mass[index] < kLeastGain * whole) return;
 
     Box halves[2] = {box, box};
     for (Box& h : halves) h.volume *= 0.5, ++h.halvings[size_t(best)];
@@ -61,20 +62,21 @@ struct EmissionGuide::Builder {
     const double count = sum * sum / squares, below = std::accumulate(bins[best], bins[best] + kBins / 2, 0.0) / sum;
     const double share = (below * count + kUnseen) / (count + 2.0 * kUnseen);
     const uint32_t first = uint32_t(nodes.size());
-    nodes.resize(nodes.size() + 2);
-    nodes[index].first = first, nodes[index].axis = best;
+    nodes.resize(nodes.size() + 2), mass.resize(nodes.size());
+    nodes[index].first = first, nodes[index].axis = uint32_t(best);
     grow(first, {trials.begin(), second}, halves[0], share * worth);
     grow(first + 1, {second, trials.end()}, halves[1], (1.0 - share) * worth);
-    nodes[index].mass = nodes[first].mass + nodes[first + 1].mass;
+    mass[index] = mass[first] + mass[first + 1];
   }
 
   // Mixes even numbers in.
   void share(uint32_t index, double volume, double total) {
     Node& n = nodes[index];
-    n.mass = (1.0 - even) * n.mass / total + even * volume;
+    mass[index] = (1.0 - even) * mass[index] / total + even * volume;
     if (n.first == 0) return;
     for (uint32_t c : {n.first, n.first + 1}) share(c, 0.5 * volume, total);
-    n.lower = float(nodes[n.first].mass / n.mass);
+    n.lower = float(mass[n.first] / mass[index]);
+    n.over[0] = 1.0f / n.lower, n.over[1] = 1.0f / (1.0f - n.lower);
   }
 };
 
@@ -86,25 +88,26 @@ EmissionGuide::EmissionGuide(std::vector<Trial> trials, float even) {
   nodes_.resize(1);
   Builder builder{nodes_, std::sqrt(sum), double(even)};
   builder.grow(0, trials, {}, sum);
-  builder.share(0, 1.0, nodes_[0].mass);
+  builder.share(0, 1.0, builder.mass[0]);
 }
 
 float EmissionGuide::warp(EmissionNumbers& u) const {
   if (nodes_.empty()) return 1.0f;
   EmissionNumbers low{}, size;
   size.fill(1.0f);
-  float pdf = 1.0f;
+  float weight = 1.0f;
+  // Both sides are worked out: which it is would be guessed wrong every other time.
   for (const Node* n = &nodes_[0]; n->first != 0;) {
-    const size_t a = size_t(n->axis);
-    const bool upper = u[a] >= n->lower;
-    const float share = upper ? 1.0f - n->lower : n->lower;
-    u[a] = std::min((upper ? u[a] - n->lower : u[a]) / share, kOneMinusEpsilon);
-    size[a] *= 0.5f, pdf *= 2.0f * share;
-    if (upper) low[a] += size[a];
-    n = &nodes_[n->first + (upper ? 1 : 0)];
+    const uint32_t a = n->axis;
+    const float below = u[a] * n->over[0], above = (u[a] - n->lower) * n->over[1], middle = low[a] + (size[a] *= 0.5f);
+    const bool upper = above >= 0.0f;
+    u[a] = upper ? above : below;
+    low[a] = upper ? middle : low[a];
+    weight *= 0.5f * (upper ? n->over[1] : n->over[0]);
+    n = &nodes_[n->first + upper];
   }
   for (size_t a = 0; a < kEmissionAxes; ++a) u[a] = std::min(low[a] + size[a] * u[a], kOneMinusEpsilon);
-  return 1.0f / pdf;
+  return weight;
 }
 
 SeenPoints::SeenPoints(const std::vector<Vec3>& points, ThreadPool& pool) : tree_(points, pool) {

@@ -30,9 +30,9 @@ class EmissionGuide {
  private:
   struct Node {
     uint32_t first = 0;  // of two children; 0: none
-    int axis = 0;        // that they halve
-    double mass = 0;
+    uint32_t axis = 0;   // that they halve
     float lower = 0.5f;  // the first child's share
+    float over[2] = {2, 2};  // 1 over each one's share
   };
   struct Builder;
   std::vector<Node> nodes_;

@@ -68,9 +68,7 @@ void IrradianceLevel::improve(size_t index, const GatheredIrradiance& guided, fl
 
 void IrradianceLevel::learn(ThreadPool& pool) {
   if (tree_.size() == size()) return;
-  std::vector<Vec3> positions;
-  for (const IrradianceRecord& r : cache_.records()) positions.push_back(r.position);
-  tree_ = PointTree(positions, pool);
+  tree_ = PointTree(cache_.records(), [](const IrradianceRecord& r) { return r.position; }, pool);
 }
 
 IrradianceGuide IrradianceLevel::guide(size_t record) const {

@@ -63,10 +63,7 @@ void LightMerge::send(const RenderContext& context, int pass, const SubpathSetti
                                                                       if (!path[i].bsdf.is_delta())
                                                                         batch.push_back({path[i].point.position, MergeVertex(path[i])});
                                                                   }));
-  std::vector<Vec3> positions;
-  positions.reserve(found.size());
-  for (const Found& f : found) positions.push_back(f.position);
-  tree_ = PointTree(positions, context.pool);
+  tree_ = PointTree(found, [](const Found& f) { return f.position; }, context.pool);
   vertices_.clear();
   vertices_.reserve(found.size());
   for (const uint32_t i : tree_.order()) vertices_.push_back(found[i].vertex);

@@ -33,7 +33,8 @@ std::vector<Batch> trace_light_paths(const RenderContext& context, const Subpath
   constexpr int kBatch = 1024;
   std::vector<Batch> found(size_t((count + kBatch - 1) / kBatch));
   context.pool.for_each(int(found.size()), context.cancelled, [&](int b) {
-    static thread_local LightVertices path;
+    static thread_local LightVertices kept;
+    LightVertices& path = kept;  // found once
     for (int k = b * kBatch; k < std::min((b + 1) * kBatch, count); ++k) {
       Sampler sampler = light_sampler(context, pass, count, uint32_t(k));
       path.clear();
@@ -44,14 +45,15 @@ std::vector<Batch> trace_light_paths(const RenderContext& context, const Subpath
   return found;
 }
 
-// What they were given to, in one piece.
+// Appends what they were given to.
+template <class T, class All>
+void append(std::vector<std::vector<T>> batches, All& all) {
+  for (auto& batch : batches) all.insert(all.end(), batch.begin(), batch.end()), std::vector<T>().swap(batch);
+}
 template <class T>
 std::vector<T> joined(std::vector<std::vector<T>> batches) {
-  size_t total = 0;
-  for (const auto& batch : batches) total += batch.size();
   std::vector<T> all;
-  all.reserve(total);
-  for (auto& batch : batches) all.insert(all.end(), batch.begin(), batch.end()), std::vector<T>().swap(batch);
+  append(std::move(batches), all);
   return all;
 }
 

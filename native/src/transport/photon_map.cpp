@@ -6,19 +6,18 @@ namespace {
 
 float sign_of(float x) { return x < 0.0f ? -1.0f : 1.0f; }
 
-// The limits of the eye, less what the light's part of the path has used up; nothing if that is more than there is.
-std::optional<Photon> within_limits(const LightVertex& v, const BounceLimits& limits, int most) {
+// Sets the limits of the eye, less what the light's part of the path has used up; false if that is more than there is.
+bool limit(const LightVertex& v, const BounceLimits& limits, Photon& photon) {
   BounceCount used = v.bounces;
   if (!v.is_first()) used.add(kReflection | kDiffuse);
-  const int left[4] = {std::min(limits.total, most) - used.total, limits.diffuse - used.diffuse, limits.glossy - used.glossy,
+  const int left[4] = {std::min(limits.total, v.max_bounces) - used.total, limits.diffuse - used.diffuse, limits.glossy - used.glossy,
                        limits.transmission - used.transmission};
-  Photon photon;
   uint8_t* to[4] = {&photon.total, &photon.diffuse, &photon.glossy, &photon.transmission};
   for (int k = 0; k < 4; ++k) {
-    if (left[k] < 0) return {};
+    if (left[k] < 0) return false;
     *to[k] = uint8_t(std::min(left[k], 255));
   }
-  return photon;
+  return true;
 }
 
 // Of a photon at a squared distance, that of the border being 1; on average over the disc 1. [Jensen 2001, eq. 7.8 and 7.9; the latter's
@@ -60,31 +59,30 @@ Rgb photon_power(const LightVertex& v, const SubpathSettings& settings, uint8_t 
   return v.power * share * (v.hides_mirrors(settings.without) ? Rgb(1.0f) - v.last_by_mirrors : Rgb(1.0f));
 }
 
-std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes) {
-  return joined(trace_light_paths<std::vector<Photon>>(
-      context, settings, pass, count, [&](const LightVertices& path, Sampler&, std::vector<Photon>& photons) {
-        for (int i = 0; i < int(path.count()); ++i) {
-          const LightVertex& v = path[size_t(i)];
-          const Rgb power = photon_power(v, settings, classes);
-          if (is_black(power)) continue;
-          auto photon = within_limits(v, settings.limits, v.max_bounces);
-          if (!photon) continue;
-          photon->position = v.point.position, photon->wi = PackedDirection(v.point.wo), photon->normal = PackedDirection(v.point.ng);
-          photon->power[0] = power.r(), photon->power[1] = power.g(), photon->power[2] = power.b();
-          photons.push_back(*photon);
-        }
-      }));
+void trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes,
+                   LargeVector<Photon>& photons) {
+  append(trace_light_paths<std::vector<Photon>>(context, settings, pass, count,
+                                                [&](const LightVertices& path, Sampler&, std::vector<Photon>& batch) {
+                                                  for (int i = 0; i < int(path.count()); ++i) {
+                                                    const LightVertex& v = path[size_t(i)];
+                                                    const Rgb power = photon_power(v, settings, classes);
+                                                    if (is_black(power)) continue;
+                                                    Photon& photon = batch.emplace_back();
+                                                    photon.position = v.point.position, photon.wi = PackedDirection(v.point.wo),
+                                                    photon.normal = PackedDirection(v.point.ng);
+                                                    photon.power[0] = power.r(), photon.power[1] = power.g(), photon.power[2] = power.b();
+                                                    if (!limit(v, settings.limits, photon)) batch.pop_back();
+                                                  }
+                                                }),
+         photons);
 }
 
 double shrinking(int pass, double alpha) {
   return std::exp(std::lgamma(pass + 1 + alpha) - std::lgamma(1 + alpha) - std::lgamma(pass + 2.0));
 }
 
-PhotonMap::PhotonMap(std::vector<Photon> photons, double paths, ThreadPool& pool) : scale_(float(1.0 / paths)) {
-  std::vector<Vec3> positions;
-  positions.reserve(photons.size());
-  for (const Photon& p : photons) positions.push_back(p.position);
-  tree_ = PointTree(positions, pool);
+PhotonMap::PhotonMap(const LargeVector<Photon>& photons, double paths, ThreadPool& pool)
+    : tree_(photons, [](const Photon& p) { return p.position; }, pool), scale_(float(1.0 / paths)) {
   lights_.reserve(photons.size());
   for (const uint32_t i : tree_.order()) lights_.push_back(photons[i]);
 }
@@ -110,8 +108,8 @@ std::optional<Photon> Photon::read(const float* row) {
   return p;
 }
 
-std::vector<Photon> PhotonMap::photons() const {
-  std::vector<Photon> all(size());
+LargeVector<Photon> PhotonMap::photons() const {
+  LargeVector<Photon> all(size());
   for (size_t k = 0; k < size(); ++k) static_cast<PhotonLight&>(all[k]) = lights_[k], all[k].position = position(k);
   return all;
 }

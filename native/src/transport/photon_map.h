@@ -51,9 +51,10 @@ enum PhotonClass : uint8_t {
 // The part of a vertex's power that is of the wished classes, and not thrown by lobes that diffuse surfaces are told not to see.
 Rgb photon_power(const LightVertex& v, const SubpathSettings& settings, uint8_t classes);
 
-// Sends out the `count` light paths of a pass, and keeps what they leave of the wished classes (bits of PhotonClass). All light is that of
-// the photons over `count`. The order is that of the paths.
-std::vector<Photon> trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes);
+// Sends out the `count` light paths of a pass, and appends to `photons` what they leave of the wished classes (bits of PhotonClass). All
+// light is that of these over `count`. The order is that of the paths.
+void trace_photons(const RenderContext& context, const SubpathSettings& settings, int pass, int count, uint8_t classes,
+                   LargeVector<Photon>& photons);
 
 // The squared radius of a pass over the first one's, where each is to keep `alpha` of the photons of a disc: ∏ (i + α) / (i + 1).
 // [Knaus & Zwicker 2011, eq. 15]
@@ -80,10 +81,10 @@ enum class PhotonFilter { kDisc, kCone, kGauss };
 class PhotonMap {
  public:
   PhotonMap() = default;
-  PhotonMap(std::vector<Photon> photons, double paths, ThreadPool& pool);
+  PhotonMap(const LargeVector<Photon>& photons, double paths, ThreadPool& pool);
 
   size_t size() const { return lights_.size(); }
-  std::vector<Photon> photons() const;
+  LargeVector<Photon> photons() const;
   Vec3 position(size_t k) const { return tree_.point(uint32_t(k)); }
   Vec3 normal(size_t k) const { return lights_[k].normal.unpack(); }
   size_t memory_bytes() const { return lights_.capacity() * sizeof(PhotonLight) + tree_.memory_bytes(); }
@@ -111,7 +112,7 @@ class PhotonMap {
   // Those that irradiance is estimated by.
   const std::vector<PointTree::Found>& around(Vec3 position, Vec3 normal, float radius, size_t count, const PathState& eye) const;
 
-  std::vector<PhotonLight> lights_;  // in the order of the tree
+  LargeVector<PhotonLight> lights_;  // in the order of the tree
   PointTree tree_;
   float scale_ = 0;  // 1 / paths
 };

@@ -108,7 +108,7 @@ void trace_from_light(const RenderContext& context, const SubpathSettings& setti
     const uint32_t visible = context.scene.instances()[hit->instance].data->visibility;
     passed *= passed_by_absorbers(context, ray, hit->t, state);
     LightVertex& v = vertices.grow();
-    v.point = context.scene.shading_point(ray, *hit, state);
+    new (&v.point) ShadingPoint(context.scene.shading_point(ray, *hit, state));  // made in its place: it is large
     if (carried.is_first() && !(visible & kRayShadow)) {  // throws no shadow: the light goes on as if nothing were there
       ray = ray_from(v.point, ray.direction);
       continue;
