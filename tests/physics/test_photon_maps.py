@@ -66,6 +66,20 @@ def test_glass_takes_nothing_and_holds_no_photons(balls):
     assert (np.abs(kept["caustic"][1:, :3]).max(1) > 0.99).all()
 
 
+def test_caustic_photons_are_of_like_power():
+    """Of walls that are half diffuse, and throw a tenth back as gloss, every photon is a caustic one in part: P Σ (1/10)ⁱ together. The many
+    small parts are few photons of about the same power, so that as many neighbours count."""
+    b = ProgramBuilder()
+    b.op("diffuse", 0.5, (1, 1, 1), 0.0, (0, 0, 0))
+    b.op("glossy", 0.1, (1, 1, 1), 0.5, 0.0, 0.0, (0, 0, 0), (0, 0, 0), imm=(1,))
+    scene = scene_of((cube(), b.finish("walls")), lights=[lamp("POINT", (1.0,) * 3, matrix=matrix((0.2, 0.1, -0.3)))])
+    sent = {"global_photons": 100, "caustic_photons": 200_000, "global_light": "PHOTONS"}
+    _, kept = render("photon_map", scene, (0, 0, 0), (0, 0, -1), 1.0, **sent)
+    assert power_of(kept["caustic"]) == pytest.approx(1 / 9, rel=0.02)
+    powers = kept["caustic"][1:, POWERS].mean(1, dtype=np.float64)
+    assert powers.sum() ** 2 / (powers**2).sum() > 0.5 * len(powers)
+
+
 def tinted(color):
     """Clear glass that does not refract."""
     b = ProgramBuilder()

@@ -236,6 +236,13 @@ class PhotonMapIntegrator final : public Integrator {
       stock.seconds_traced += context.seconds() - start;
       return true;
     };
+    // Where light is gloss and more of it diffuse, caustic photons have any part of the power; those of a file are as they were.
+    const auto settle = [&] {
+      stock.settle(context);
+      if (!guide || classes != kCausticPhoton) return;
+      stock.loose = stock.map.equalised(hash_combine(context.seed, uint32_t(stock.paths)));
+      stock.settle(context);
+    };
     const bool was_complete = stock.is_complete();
     if (stock.loose.empty() && !was_complete) stock.loose = stock.map.photons();
     const int batch = (paths + kBatches - 1) / kBatches;
@@ -243,7 +250,7 @@ class PhotonMapIntegrator final : public Integrator {
       if (!trace(stock.batches, batch)) return;
       stock.paths = double(++stock.batches) * batch;
     }
-    if (!was_complete) stock.settle(context);
+    if (!was_complete) settle();
     if (stock.batches < kBatches)
       context.log.say(name + " photons: time for " + std::to_string(stock.batches * batch) + " of " + std::to_string(paths) +
                       " light paths");
@@ -267,7 +274,7 @@ class PhotonMapIntegrator final : public Integrator {
       stock.loose = stock.map.photons();
       if (!trace(1, int(stock.paths))) return stock.loose.clear();  // those of before are in the map
       stock.paths *= 2.0;
-      stock.settle(context);
+      settle();
     }
   }
 

@@ -114,6 +114,24 @@ LargeVector<Photon> PhotonMap::photons() const {
   return all;
 }
 
+LargeVector<Photon> PhotonMap::equalised(uint32_t seed) const {
+  constexpr size_t kAround = 64;  // in the order of the tree, so of one place
+  const auto size = [](const PhotonLight& p) { return double(std::abs(p.power[0])) + std::abs(p.power[1]) + std::abs(p.power[2]); };
+  LargeVector<Photon> all = photons(), kept;
+  for (size_t begin = 0; begin < all.size(); begin += kAround) {
+    const size_t end = std::min(begin + kAround, all.size());
+    double sum = 0.0;
+    for (size_t k = begin; k < end; ++k) sum += size(all[k]);
+    for (size_t k = begin; k < end; ++k) {
+      const float left = float(std::min(size(all[k]) * double(end - begin) / sum, 1.0));
+      if (to_unit_float(hash_combine(seed, uint32_t(k))) >= left) continue;
+      for (float& channel : all[k].power) channel /= left;
+      kept.push_back(all[k]);
+    }
+  }
+  return kept;
+}
+
 PhotonError PhotonMap::error(const std::vector<PathEnd>& places, float radius, size_t count, const PathState& eye) const {
   const size_t probes = std::min<size_t>(512, places.size());
   double noise = 0, difference = 0;

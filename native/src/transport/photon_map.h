@@ -85,6 +85,9 @@ class PhotonMap {
 
   size_t size() const { return lights_.size(); }
   LargeVector<Photon> photons() const;
+  // Those of less power than the mean around them become fewer of the mean, by roulette: an estimate by so many neighbours is as noisy as
+  // if they were fewer where their powers differ, and those that hardly count only take room. [Jensen 2001, §5.2]
+  LargeVector<Photon> equalised(uint32_t seed) const;
   Vec3 position(size_t k) const { return tree_.point(uint32_t(k)); }
   Vec3 normal(size_t k) const { return lights_[k].normal.unpack(); }
   size_t memory_bytes() const { return lights_.capacity() * sizeof(PhotonLight) + tree_.memory_bytes(); }
