@@ -65,7 +65,7 @@ def test_integrating_sphere(way):
     scene = scene_of(
         (sphere(rings=32), surface(0.5)), lights=[lamp("POINT", (4 * math.pi**2,) * 3, matrix=matrix((0, 0, 0)))]
     )
-    mean, error = repeated(8, scene, (0.2, 0.1, 0), (0.5, 0.3, 0.7), samples=8, particles=20000, texel_size=0.3, **way)
+    mean, error = repeated(16, scene, (0.2, 0.1, 0), (0.5, 0.3, 0.7), samples=8, particles=20000, texel_size=0.3, **way)
     assert error < 0.02
     assert abs(mean - 1) < 4 * error + 0.01  # 32 rings have half a percent less surface
 
