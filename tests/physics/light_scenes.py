@@ -81,3 +81,16 @@ class Samples:
         x = np.zeros(self.total)
         x[self.valid] = np.maximum(self.wi @ np.asarray(normal, np.float64).ravel(), 0) * self.radiance[:, 0] / self.pdf
         return x.mean(), x.std() / np.sqrt(self.total)
+
+
+def image_sky(resolution=64, sun=2000.0, **fields):
+    """A gradient with one bright pixel."""
+    height, width = resolution // 2, resolution
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., :3] *= np.linspace(0.0, 1.0, height, dtype=np.float32)[:, None, None]
+    pixels[height * 3 // 4, width // 3, :3] = sun
+    builder = ProgramBuilder()
+    color, _ = builder.op("environment", builder.op("object_position"), imm=(0, 0, 0))
+    builder.op("emission", 1.0, color, 1.0)
+    scene = sd.Scene(images=[[sd.Image("sky", pixels)]])
+    return with_world(scene, builder.finish("sky"), **fields)

@@ -9,9 +9,8 @@ import time
 import numpy as np
 import pytest
 from agreement_scenes import SCENES, camera
-from light_scenes import f32, lamp, matrix, triangle_scene
+from light_scenes import f32, image_sky, lamp, matrix, triangle_scene
 from test_closed_forms import cube, lambert, probe, quad, scene_of, shiny, sphere, surface
-from test_lights import image_sky
 
 from gi_engine import native
 from gi_engine import scene_data as sd

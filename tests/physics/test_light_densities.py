@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from light_scenes import NO_NORMAL, ORIGIN, UP, Samples, build, emission, f32, uniforms, with_world
+from light_scenes import NO_NORMAL, ORIGIN, UP, Samples, build, emission, f32, image_sky, uniforms, with_world
 from light_surfaces import CASES, SIGNIFICANCE, Equirectangular, surface_p_value
 
 from gi_engine import scene_data as sd
-from gi_engine.nodes.program import ProgramBuilder
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -38,19 +37,6 @@ def test_sampled_and_found_light_agree(name):
 
 
 # ---------------------------------------------------------------- world
-
-
-def image_sky(resolution=64, sun=2000.0, **fields):
-    """A gradient with one bright pixel."""
-    height, width = resolution // 2, resolution
-    pixels = np.ones((height, width, 4), np.float32)
-    pixels[..., :3] *= np.linspace(0.0, 1.0, height, dtype=np.float32)[:, None, None]
-    pixels[height * 3 // 4, width // 3, :3] = sun
-    builder = ProgramBuilder()
-    color, _ = builder.op("environment", builder.op("object_position"), imm=(0, 0, 0))
-    builder.op("emission", 1.0, color, 1.0)
-    scene = sd.Scene(images=[[sd.Image("sky", pixels)]])
-    return with_world(scene, builder.finish("sky"), **fields)
 
 
 @pytest.mark.parametrize("resolution", [64, 32])
