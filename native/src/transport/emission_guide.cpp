@@ -101,7 +101,7 @@ float EmissionGuide::warp(EmissionNumbers& u) const {
     const uint32_t a = n->axis;
     const float below = u[a] * n->over[0], above = (u[a] - n->lower) * n->over[1], middle = low[a] + (size[a] *= 0.5f);
     const bool upper = above >= 0.0f;
-    u[a] = upper ? above : below;
+    u[a] = std::min(upper ? above : below, kOneMinusEpsilon);  // below 1, or a half of no mass might be taken
     low[a] = upper ? middle : low[a];
     weight *= 0.5f * (upper ? n->over[1] : n->over[0]);
     n = &nodes_[n->first + upper];

@@ -1,6 +1,8 @@
 // Walking from the light, and what a vertex sends on.
 #include "transport/subpath.h"
 
+#include <new>
+
 namespace gi {
 namespace {
 
